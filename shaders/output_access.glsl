@@ -12,18 +12,41 @@
 #endif
 #include "stream.glsl"
 
+// Attributes that follow each other without a gap may share a word, which is stored with the second of them. Whether they do depends
+// on formats only: the attributes before it are then not whole words together.
+
+// The bytes of an attribute and, if it begins in the middle of a word, of the half before it. `before`: bytes of the attributes
+// before it.
+uint bytesFromWord(uint before, uint format) { return before % 4u + formatBytes(format); }
+
+// Puts the last two bytes of the attribute before it, which has this format, before an attribute.
+uvec4 behindHalf(uvec4 before, uint format, uvec4 words) {
+  uint first = formatBytes(format) - 2u;
+  uint last = (before[first / 4u] >> (first % 4u * 8u)) & 0xffffu;
+  return uvec4(last, words.xyz >> 16u) | (words << 16u);
+}
+
+// Makes all attributes begin at the beginning of a word.
+void joinAttributes(uvec4 position, inout uvec4 normal, inout uvec4 tangent) {
+  uint positions = formatBytes(POSITION_FORMAT);
+  if ((positions + formatBytes(NORMAL_FORMAT)) % 4u != 0u) {
+    if (NORMALS) {
+      tangent = behindHalf(normal, NORMAL_FORMAT, tangent);
+    } else {
+      tangent = behindHalf(position, POSITION_FORMAT, tangent);
+    }
+  }
+  if (positions % 4u != 0u) normal = behindHalf(position, POSITION_FORMAT, normal);
+}
+
 #if defined(TEXELS) || defined(STAGED)
-// All attributes of a vertex, which are adjacent in memory. Sizes are whole words, or positions have 6 bytes and normals 2.
-// Sizes are constants, so that only moves remain after compilation.
+// All attributes of a vertex, which are adjacent in memory and joined. Sizes are constants, so that only moves remain after
+// compilation.
 uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
   uint words[12] = uint[12](position.x, position.y, position.z, position.w, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
   uint positions = formatBytes(POSITION_FORMAT);
   uint normals = formatBytes(NORMAL_FORMAT);
-  if (positions == 6u) {
-    words[1] = (position.y & 0xffffu) | normal.x << 16u;
-  } else {
-    for (uint i = 0u; i < 4u; ++i) words[positions / 4u + i] = normal[i];
-  }
+  for (uint i = 0u; i < 4u; ++i) words[positions / 4u + i] = normal[i];
   for (uint i = 0u; i < 4u; ++i) words[(positions + normals) / 4u + i] = tangent[i];
   return words;
 }

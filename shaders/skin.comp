@@ -5,7 +5,6 @@
 // for up to INSTANCES instances of that mesh, so that a vertex is read once for all of them. Macros select the features of a module
 // (CMakeLists.txt lists the modules). With all features in one module, drivers would take several times as long to create each
 // pipeline. The macros:
-//   HALVES, BYTES   attributes may begin at multiples of 2 bytes (requires storage16Bit), or at any byte (also storage8Bit)
 //   EXTRAS          previous positions and results; separate modules, since layers and drivers treat everything that a module
 //                   declares as used, whatever its specialization constants are
 //   BULGE           the methods that reduce the bulge (blended, center of rotation, bulge-controlled), instead of linear and dual
@@ -16,13 +15,6 @@
 //   STAGED          whole vertices are gathered in shared memory, from which consecutive invocations store 16 bytes each
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
-#ifdef BYTES
-#define HALVES
-#extension GL_EXT_shader_8bit_storage : require
-#endif
-#ifdef HALVES
-#extension GL_EXT_shader_16bit_storage : require
-#endif
 #ifdef TEXELS
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
@@ -43,10 +35,7 @@ layout(constant_id = CONSTANT_INSTANCES) const uint INSTANCES = 1u;
 layout(constant_id = CONSTANT_POSITION_FORMAT) const uint POSITION_FORMAT = FORMAT_FLOAT32X3;
 layout(constant_id = CONSTANT_NORMAL_FORMAT) const uint NORMAL_FORMAT = FORMAT_NONE;
 layout(constant_id = CONSTANT_TANGENT_FORMAT) const uint TANGENT_FORMAT = FORMAT_NONE;
-layout(constant_id = CONSTANT_POSITION_UNIT) const uint POSITION_UNIT = 4u;
-layout(constant_id = CONSTANT_NORMAL_UNIT) const uint NORMAL_UNIT = 4u;
-layout(constant_id = CONSTANT_TANGENT_UNIT) const uint TANGENT_UNIT = 4u;
-layout(constant_id = CONSTANT_PREVIOUS_UNIT) const uint PREVIOUS_UNIT = 4u;
+layout(constant_id = CONSTANT_WIDE) const uint WIDE = 0u;
 layout(constant_id = CONSTANT_MORPHS) const bool MORPHS = false;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 layout(constant_id = CONSTANT_FULL) const bool FULL = false;
@@ -65,6 +54,10 @@ layout(constant_id = CONSTANT_BOUNDS) const bool BOUNDS = false;
 const bool BOUNDS = false;
 #endif
 
+const bool WIDE_POSITIONS = (WIDE & 1u) != 0u;
+const bool WIDE_NORMALS = (WIDE & 2u) != 0u;
+const bool WIDE_TANGENTS = (WIDE & 4u) != 0u;
+const bool WIDE_PREVIOUS = (WIDE & 8u) != 0u;
 const bool NORMALS = NORMAL_FORMAT != FORMAT_NONE;
 const bool TANGENTS = TANGENT_FORMAT != FORMAT_NONE;
 
@@ -192,14 +185,14 @@ uvec4 keptPosition(Instance instance) {
 #ifdef TEXELS
   if (RECORD == 24u && POSITION_FORMAT == FORMAT_FLOAT32X3) return loadRecordPosition(instance.recordPlace);
 #endif
-  return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), POSITION_UNIT);
+  return loadPositions(instance.places.x, formatBytes(POSITION_FORMAT), WIDE_POSITIONS);
 }
 #endif
 
 void skinInstance(Instance instance, Work work, bool scales) {
 #ifdef HAS_MOTION
   if (MOTION && (instance.record.joints & INSTANCE_SETTLES) != 0u) {
-    storePrevious(instance.places.w, keptPosition(instance), formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+    storePrevious(instance.places.w, keptPosition(instance), formatBytes(POSITION_FORMAT), WIDE_PREVIOUS);
     return;
   }
 #endif
@@ -218,21 +211,24 @@ void skinInstance(Instance instance, Work work, bool scales) {
   // The kept position must be read before the new one overwrites it.
   if (MOTION) {
     bool restarts = (instance.record.joints & INSTANCE_RESTARTS) != 0u;
-    storePrevious(instance.places.w, restarts ? position : keptPosition(instance), formatBytes(POSITION_FORMAT), PREVIOUS_UNIT);
+    storePrevious(instance.places.w, restarts ? position : keptPosition(instance), formatBytes(POSITION_FORMAT), WIDE_PREVIOUS);
   }
 #endif
   uvec4 normal = NORMALS ? encodeNormal(NORMAL_FORMAT, skinned.normal) : uvec4(0u);
   uvec4 tangent = TANGENTS ? encodeTangent(TANGENT_FORMAT, skinned.tangent) : uvec4(0u);
+  joinAttributes(position, normal, tangent);
+  uint positions = formatBytes(POSITION_FORMAT);
+  uint normals = formatBytes(NORMAL_FORMAT);
   if (RECORD > RECORD_IN_PAIRS) {
     storeRecord(instance.recordPlace, position, normal, tangent);
   } else {
     if (RECORD == RECORD_IN_PAIRS) {
       storePositionAndNormal(instance.places.x, position.xyz, normal.xyz);
     } else {
-      storePositions(instance.places.x, position, formatBytes(POSITION_FORMAT), POSITION_UNIT);
-      if (NORMALS) storeNormals(instance.places.y, normal, formatBytes(NORMAL_FORMAT), NORMAL_UNIT);
+      storePositions(instance.places.x, position, positions, WIDE_POSITIONS);
+      if (NORMALS) storeNormals(instance.places.y, normal, bytesFromWord(positions, NORMAL_FORMAT), WIDE_NORMALS);
     }
-    if (TANGENTS) storeTangents(instance.places.z, tangent, formatBytes(TANGENT_FORMAT), TANGENT_UNIT);
+    if (TANGENTS) storeTangents(instance.places.z, tangent, bytesFromWord(positions + normals, TANGENT_FORMAT), WIDE_TANGENTS);
   }
 }
 

@@ -113,7 +113,7 @@ double storedBytes(const Variant& variant, double stride) {
   double stores = 0;
   const std::array formats{variant.positions, variant.normals, variant.tangents};
   for (std::size_t stream = 0; stream < formats.size(); ++stream)
-    stores += formatSize(formats[stream]) / static_cast<double>(variant.units[stream]);
+    stores += variant.wide[stream] ? 1 : formatSize(formats[stream]) / 4.0;
   if (variant.recordBytes != 0) stores = std::max(variant.recordBytes / 16.0, 1.0);
   return stores * std::min(stride, sector);
 }
@@ -169,7 +169,6 @@ std::optional<std::vector<ByteModel>> byteModels() {
   using enum VertexFormat;
   DeviceLimits words;
   words.maxStorageBuffersPerStage = storageBuffersWanted;
-  words.storage16Bit = true;
   DeviceLimits staged = words;
   staged.stagedStores = true;
   DeviceLimits wide = words;

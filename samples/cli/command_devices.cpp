@@ -19,10 +19,9 @@ ExitStatus listDevices() {
                info.unusable.empty() ? "usable" : "not usable: " + info.unusable);
     fmt::print(
         "   maximum storage buffer range {} MiB; {} storage buffers per stage; {} workgroups per "
-        "dimension; push descriptors: {}; 16-bit stores: {}; 8-bit stores: {}\n",
+        "dimension; push descriptors: {}\n",
         info.maxStorageBufferRange >> 20, info.storageBuffersPerStage, info.maxWorkgroupCount,
-        info.pushDescriptors ? "yes" : "no", info.storage16Bit ? "yes" : "no",
-        info.storage8Bit ? "yes" : "no");
+        info.pushDescriptors ? "yes" : "no");
   }
   return ExitStatus::done;
 }

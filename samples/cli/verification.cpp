@@ -314,9 +314,18 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
   return poses;
 }
 
-std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
+namespace {
+
+/// The outputs of a scene that a target supports. Together they combine each of its methods with
+/// every format that is verified.
+std::vector<OutputToVerify> outputsToVerify(const Scene& scene, const samples::BatchTarget& target,
                                             samples::Coverage coverage) {
-  const std::vector<samples::OutputCase> cases = samples::outputCases(target.limits(), coverage);
+  std::vector<MeshInfo> meshes;
+  for (const ScenePart& part : scene.parts) {
+    if (part.mesh != nullptr) meshes.push_back(part.mesh->packed().info());
+  }
+  const std::vector<samples::OutputCase> cases =
+      samples::outputCases(target.limits(), coverage, meshes);
   const std::vector<std::vector<Method>> methods =
       samples::shareOutMethods(cases, target.methods());
   std::vector<OutputToVerify> outputs;
@@ -325,10 +334,12 @@ std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
   return outputs;
 }
 
+}  // namespace
+
 SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount,
                    samples::Coverage coverage) {
   return sceneCases(figuresOf(scene, target.methods()), target.divisions(),
-                    outputsToVerify(target, coverage), poseCount);
+                    outputsToVerify(scene, target, coverage), poseCount);
 }
 
 Result<std::vector<VerifiedCase>> verifyScene(samples::TargetPool& pool, const Scene& scene,

@@ -78,11 +78,6 @@ struct PoseToVerify {
 /// The rest pose, and each clip at its beginning, at two times within it, and at its end.
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model);
 
-/// The outputs that a target supports. Together they combine each of its methods with every format
-/// that is verified.
-std::vector<OutputToVerify> outputsToVerify(const samples::BatchTarget& target,
-                                            samples::Coverage coverage = samples::Coverage::full);
-
 /// The cases of a scene for this number of poses.
 SceneCases casesOf(const Scene& scene, samples::BatchTarget& target, std::size_t poseCount,
                    samples::Coverage coverage = samples::Coverage::full);

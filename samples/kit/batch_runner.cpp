@@ -23,28 +23,38 @@ class OutputPlacer {
     const std::uint64_t vertices = job.mesh.vertexCount;
     const std::array<std::uint64_t*, streamCount> sizes{
         &sizes_.positions, &sizes_.normals, &sizes_.tangents, &sizes_.previousPositions};
+    const auto isTogether = [&](std::size_t stream) {
+      const auto which = static_cast<Stream>(stream);
+      return output_.arrangement == Arrangement::interleaved ||
+             (output_.arrangement == Arrangement::directionsTogether &&
+              (which == Stream::normals || which == Stream::tangents));
+    };
     std::uint32_t vertexSize = output_.gap;
-    for (const OutputAttribute* attribute : attributes) vertexSize += formatSize(attribute->format);
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      if (isTogether(stream)) vertexSize += formatSize(attributes[stream]->format);
+    }
+    std::uint64_t first = 0;
     std::uint32_t inVertex = 0;
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       OutputAttribute& attribute = *attributes[stream];
       const std::uint32_t size = formatSize(attribute.format);
       if (size == 0) continue;
-      if (output_.arrangement == Arrangement::interleaved) {
-        attribute.offset = sizes_.positions + inVertex;
+      std::uint64_t& end =
+          output_.arrangement == Arrangement::separate ? *sizes[stream] : sizes_.positions;
+      if (isTogether(stream)) {
+        if (inVertex == 0) {
+          first = end;
+          // Kernels that store 8 bytes at a time need instances at multiples of 8 bytes.
+          end = (end + vertices * vertexSize + 7) / 8 * 8;
+        }
+        attribute.offset = first + inVertex;
         attribute.stride = vertexSize;
         inVertex += size;
       } else {
-        std::uint64_t& end =
-            output_.arrangement == Arrangement::separate ? *sizes[stream] : sizes_.positions;
         attribute.offset = end;
         attribute.stride = size + output_.gap;
         end = (end + vertices * attribute.stride + 3) / 4 * 4;
       }
-    }
-    if (output_.arrangement == Arrangement::interleaved) {
-      // Kernels that store 8 bytes at a time need instances at multiples of 8 bytes.
-      sizes_.positions = (sizes_.positions + vertices * vertexSize + 7) / 8 * 8;
     }
   }
 

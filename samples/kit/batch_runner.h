@@ -37,9 +37,10 @@ struct SkinRequest {
 };
 
 enum class Arrangement : std::uint8_t {
-  interleaved,  ///< one buffer; the attributes of a vertex are adjacent
-  planar,       ///< one buffer; each attribute of an instance is a separate array
-  separate,     ///< a buffer for each attribute
+  interleaved,         ///< one buffer; the attributes of a vertex are adjacent
+  planar,              ///< one buffer; each attribute of an instance is a separate array
+  directionsTogether,  ///< the same, but normals and tangents are adjacent in one array
+  separate,            ///< a buffer for each attribute
 };
 
 /// How skinned vertices are stored. Normals and tangents are written if the mesh has them.

@@ -146,11 +146,9 @@ std::string CpuTarget::name() const {
   const std::string best(cpu::targetNames().front());
   return "cpu (" + (instructions_.empty() ? best : instructions_) + ")";
 }
-/// The CPU can store every format.
 DeviceLimits CpuTarget::limits() const {
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.storage16Bit = limits.storage8Bit = true;
   return limits;
 }
 std::span<const Method> CpuTarget::methods() const {

@@ -97,26 +97,16 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
   const std::vector<VkExtensionProperties> extensions = deviceExtensions(functions, device);
   info.pushDescriptors = contains(extensions, VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME);
   if (properties.apiVersion >= VK_API_VERSION_1_1) {
-    VkPhysicalDevice8BitStorageFeatures storage8Bit{};
-    storage8Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
-    VkPhysicalDevice16BitStorageFeatures storage16Bit{};
-    storage16Bit.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    const bool has8Bit = contains(extensions, VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
-    if (has8Bit) storage16Bit.pNext = &storage8Bit;
     VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout{};
     scalarBlockLayout.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
     const bool hasScalar = contains(extensions, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
-    if (hasScalar) storage8Bit.pNext = &scalarBlockLayout;
-    if (hasScalar && !has8Bit) storage16Bit.pNext = &scalarBlockLayout;
     VkPhysicalDeviceFeatures2 features{};
     features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
-    features.pNext = &storage16Bit;
+    if (hasScalar) features.pNext = &scalarBlockLayout;
     functions.GetPhysicalDeviceFeatures2(device, &features);
     info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
     info.int64 = features.features.shaderInt64 == VK_TRUE;
-    info.storage16Bit = storage16Bit.storageBuffer16BitAccess == VK_TRUE;
-    info.scalarBlockLayout = hasScalar && scalarBlockLayout.scalarBlockLayout == VK_TRUE;
-    info.storage8Bit = has8Bit && storage8Bit.storageBuffer8BitAccess == VK_TRUE;
+    info.scalarBlockLayout = scalarBlockLayout.scalarBlockLayout == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
     info.accelerationStructures = rayTracing.accelerationStructures();
     info.rayQueries = rayTracing.rayQueries();
@@ -284,28 +274,16 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
   if (options.pipelineStatistics && info_.pipelineStatistics)
     features_.features.pipelineStatisticsQuery = VK_TRUE;
-  features_.pNext = &storage16Bit_;
-  storage16Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-  storage8Bit_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
-  if (options.smallStorage && info_.storage16Bit) storage16Bit_.storageBuffer16BitAccess = VK_TRUE;
-  if (options.smallStorage && info_.storage8Bit) {
-    storage8Bit_.storageBuffer8BitAccess = VK_TRUE;
-    storage16Bit_.pNext = &storage8Bit_;
-    extensions.push_back(VK_KHR_8BIT_STORAGE_EXTENSION_NAME);
-  }
-  // At the front of the chain.
   scalarBlockLayout_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
   if (info_.scalarBlockLayout) {
     scalarBlockLayout_.scalarBlockLayout = VK_TRUE;
-    scalarBlockLayout_.pNext = features_.pNext;
     features_.pNext = &scalarBlockLayout_;
     extensions.push_back(VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME);
   }
   if (options.rayTracing) {
     rayTracing_ = RayTracingFeatures(functions_, physicalDevice_,
                                      deviceExtensions(functions_, physicalDevice_));
-    void*& end = storage16Bit_.pNext != nullptr ? storage8Bit_.pNext : storage16Bit_.pNext;
-    end = rayTracing_.chain();
+    (info_.scalarBlockLayout ? scalarBlockLayout_.pNext : features_.pNext) = rayTracing_.chain();
     for (const char* extension : rayTracing_.extensions()) extensions.push_back(extension);
   }
   enabledExtensions_.insert(enabledExtensions_.end(), extensions.begin(), extensions.end());

@@ -26,8 +26,6 @@ struct DeviceInfo {
   std::uint32_t maxWorkgroupCount = 0;
   std::uint32_t storageBuffersPerStage = 0;
   bool pushDescriptors = false;
-  bool storage16Bit = false;       ///< kernels can store 2 bytes
-  bool storage8Bit = false;        ///< kernels can store 1 byte
   bool int64 = false;              ///< kernels can use 64-bit integers
   bool scalarBlockLayout = false;  ///< kernels can store up to 32 bytes at once
   bool accelerationStructures = false;
@@ -43,7 +41,6 @@ struct DeviceOptions {
   bool validation = false;      ///< enable the Khronos layer with core and synchronization checks;
                                 ///< fails if it is not installed
   bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor if the device has it
-  bool smallStorage = true;     ///< enable stores of 1 and 2 bytes if the device has them
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries if the device has them
   bool graphics = false;        ///< requires a graphics queue
@@ -121,8 +118,6 @@ class Device {
   VkCommandPool commandPool_ = VK_NULL_HANDLE;
   std::vector<const char*> enabledExtensions_;
   VkPhysicalDeviceFeatures2 features_{};
-  VkPhysicalDevice16BitStorageFeatures storage16Bit_{};
-  VkPhysicalDevice8BitStorageFeatures storage8Bit_{};
   VkPhysicalDeviceScalarBlockLayoutFeatures scalarBlockLayout_{};
   RayTracingFeatures rayTracing_;
   std::mutex messagesMutex_;

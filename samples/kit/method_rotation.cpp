@@ -98,21 +98,25 @@ std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> out
 
 namespace {
 
-constexpr std::uint32_t notChosen = 0xffffffffu;
+using IsPossible = std::function<bool(std::span<const std::uint32_t>)>;
+
 constexpr int candidates = 30;
 
 /// The pairs that do not occur yet.
 class OpenPairs {
  public:
-  explicit OpenPairs(std::span<const std::uint32_t> counts) : counts_(counts) {
+  OpenPairs(std::span<const std::uint32_t> counts, const IsPossible& isPossible) : counts_(counts) {
     firsts_.resize(counts.size() * counts.size());
     for (std::size_t a = 0; a < counts.size(); ++a) {
       for (std::size_t b = a + 1; b < counts.size(); ++b) {
         firsts_[a * counts.size() + b] = open_.size();
-        open_.resize(open_.size() + std::size_t{counts[a]} * counts[b], true);
+        std::vector<std::uint32_t> pair(counts.size(), notChosen);
+        for (pair[a] = 0; pair[a] < counts[a]; ++pair[a]) {
+          for (pair[b] = 0; pair[b] < counts[b]; ++pair[b]) open_.push_back(isPossible(pair));
+        }
       }
     }
-    left_ = open_.size();
+    left_ = static_cast<std::size_t>(std::ranges::count(open_, true));
   }
 
   std::size_t left() const { return left_; }
@@ -167,7 +171,8 @@ class OpenPairs {
 
 /// Fills in the parameters in a random order, each with a value that closes the most pairs.
 std::uint32_t complete(std::vector<std::uint32_t>& combination, const OpenPairs& pairs,
-                       std::span<const std::uint32_t> counts, std::mt19937& engine) {
+                       std::span<const std::uint32_t> counts, const IsPossible& isPossible,
+                       std::mt19937& engine) {
   std::vector<std::size_t> order(counts.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[engine() % i]);
@@ -175,11 +180,13 @@ std::uint32_t complete(std::vector<std::uint32_t>& combination, const OpenPairs&
   for (const std::size_t parameter : order) {
     if (combination[parameter] != notChosen) continue;
     const std::uint32_t start = static_cast<std::uint32_t>(engine() % counts[parameter]);
-    std::uint32_t best = start, bestGain = 0;
+    std::uint32_t best = notChosen, bestGain = 0;
     for (std::uint32_t i = 0; i < counts[parameter]; ++i) {
       const std::uint32_t value = (start + i) % counts[parameter];
+      combination[parameter] = value;
+      if (!isPossible(combination)) continue;
       const std::uint32_t gain = pairs.gain(combination, parameter, value);
-      if (gain > bestGain) {
+      if (best == notChosen || gain > bestGain) {
         best = value;
         bestGain = gain;
       }
@@ -195,8 +202,8 @@ std::uint32_t complete(std::vector<std::uint32_t>& combination, const OpenPairs&
 // Greedy, as in Cohen et al. 1997, "The AETG system": each candidate begins with a pair that does
 // not occur yet, and the candidate with the most such pairs is chosen.
 std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
-    std::span<const std::uint32_t> valueCounts) {
-  OpenPairs pairs(valueCounts);
+    std::span<const std::uint32_t> valueCounts, const IsPossible& isPossible) {
+  OpenPairs pairs(valueCounts, isPossible);
   std::mt19937 engine(1);
   std::vector<std::vector<std::uint32_t>> combinations;
   while (pairs.left() != 0) {
@@ -207,7 +214,7 @@ std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
       std::vector<std::uint32_t> combination(valueCounts.size(), notChosen);
       combination[open[0]] = open[1];
       combination[open[2]] = open[3];
-      const std::uint32_t gain = 1 + complete(combination, pairs, valueCounts, engine);
+      const std::uint32_t gain = 1 + complete(combination, pairs, valueCounts, isPossible, engine);
       if (gain > bestGain) {
         best = combination;
         bestGain = gain;

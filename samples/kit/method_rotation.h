@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,9 +22,12 @@ std::vector<std::vector<Method>> shareOutMethods(std::span<const OutputCase> out
 std::vector<std::uint32_t> parameterValues(const OutputCase& output);
 
 /// Pairwise testing. For parameters with these numbers of values: combinations in which every two
-/// values of two parameters occur together at least once. A combination has the index of a value
-/// for each parameter. Deterministic.
+/// values of two parameters occur together at least once, if that is possible. A combination has
+/// the index of a value for each parameter. `isPossible` tells whether a combination can be
+/// completed in which some indices are `notChosen`. Deterministic.
 std::vector<std::vector<std::uint32_t>> pairwiseCombinations(
-    std::span<const std::uint32_t> valueCounts);
+    std::span<const std::uint32_t> valueCounts,
+    const std::function<bool(std::span<const std::uint32_t>)>& isPossible);
+inline constexpr std::uint32_t notChosen = 0xffffffffu;
 
 }  // namespace dermis::samples

@@ -57,8 +57,8 @@ struct InputValues {
 };
 
 constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
-                                  Arrangement::separate};
-constexpr std::array<std::uint32_t, 4> gaps{0, 4, 2, 1};
+                                  Arrangement::separate, Arrangement::directionsTogether};
+constexpr std::array<std::uint32_t, 2> gaps{0, 4};
 constexpr std::array motions{Motion::none, Motion::kept};
 constexpr std::array either{false, true};
 constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3, 1000}, {128, 16}}};
@@ -93,13 +93,14 @@ constexpr InputValues allInputs{rigidities,  vertexCounts,  jointCounts,    infl
 // Each method is combined with each value. Most combinations need a pipeline of their own, which
 // takes time to build. So Coverage::quick has at most three values of each parameter: common
 // formats of different encodings, and numbers of influences with different kernels.
-constexpr std::array quickPositions{VertexFormat::float32x3, VertexFormat::float16x4,
+constexpr std::array quickPositions{VertexFormat::float32x3, VertexFormat::float16x3,
                                     VertexFormat::snorm16x4};
 constexpr std::array quickNormals{VertexFormat::float32x3, VertexFormat::none,
-                                  VertexFormat::octahedral16x2};
+                                  VertexFormat::octahedral8x2};
 constexpr std::array quickTangents{VertexFormat::none, VertexFormat::float32x4,
                                    VertexFormat::octahedral8x2};
-constexpr std::array<std::uint32_t, 2> quickGaps{0, 1};
+constexpr std::array quickArrangements{Arrangement::interleaved, Arrangement::planar,
+                                       Arrangement::separate};
 constexpr std::array<Tuning, 2> quickTunings{{{64, 4}, {32, 3, 1000}}};
 constexpr std::array quickRigidities{Rigidity::rigid, Rigidity::shear, Rigidity::mirrored};
 constexpr std::array<std::uint32_t, 2> quickVertexCounts{65, 1234};
@@ -115,7 +116,7 @@ constexpr OutputValues outputValues(Coverage coverage) {
   values.positions = quickPositions;
   values.normals = quickNormals;
   values.tangents = quickTangents;
-  values.gaps = quickGaps;
+  values.arrangements = quickArrangements;
   values.tunings = quickTunings;
   return values;
 }
@@ -132,6 +133,48 @@ constexpr InputValues inputValues(Coverage coverage) {
   return values;
 }
 
+/// Whether runs of attributes can be whole words (`OutputAttribute`) with these values of the first
+/// parameters and some values of those that are not chosen. Each mesh writes the attributes that it
+/// has.
+bool areRunsPossible(const OutputValues& values, std::span<const std::uint32_t> chosen,
+                     std::span<const MeshInfo> meshes) {
+  const auto mayBe = [&](std::size_t parameter, const auto& all, auto is) {
+    return chosen[parameter] != notChosen ? is(all[chosen[parameter]])
+                                          : std::ranges::any_of(all, is);
+  };
+  const auto mayBeSmall = [&](std::size_t parameter, std::span<const VertexFormat> all,
+                              bool isSmall) {
+    return mayBe(parameter, all,
+                 [=](VertexFormat format) { return (formatSize(format) % 4 != 0) == isSmall; });
+  };
+  const auto mayStand = [&](Arrangement one) {
+    return mayBe(3, values.arrangements, [=](Arrangement other) { return other == one; });
+  };
+  const bool isInterleaved = mayStand(Arrangement::interleaved);
+  const bool isStill =
+      mayBe(5, values.motions, [](Motion motion) { return motion == Motion::none; });
+  for (unsigned small = 0; small < 8; ++small) {
+    const bool positions = (small & 1) != 0, normals = (small & 2) != 0,
+               tangents = (small & 4) != 0;
+    const bool isPlaced =
+        small == 0 || isInterleaved || (!positions && mayStand(Arrangement::directionsTogether));
+    const bool isWhole = std::ranges::all_of(meshes, [=](const MeshInfo& mesh) {
+      return positions == ((normals && mesh.hasNormals) != (tangents && mesh.hasTangents));
+    });
+    if (isPlaced && isWhole && (!positions || isStill) &&
+        mayBeSmall(0, values.positions, positions) && mayBeSmall(1, values.normals, normals) &&
+        mayBeSmall(2, values.tangents, tangents))
+      return true;
+  }
+  return false;
+}
+
+MeshInfo completeMesh() {
+  MeshInfo info;
+  info.hasNormals = info.hasTangents = true;
+  return info;
+}
+
 OutputCase chooseOutput(Choice& choice, const OutputValues& values) {
   OutputCase output;
   output.layout.positions = choice.of(values.positions);
@@ -145,20 +188,14 @@ OutputCase chooseOutput(Choice& choice, const OutputValues& values) {
   return output;
 }
 
-/// Reduces a case to what the device can store.
-OutputCase storable(OutputCase output, const DeviceLimits& limits) {
-  const bool fewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
-  const std::uint32_t unit = fewBuffers || !limits.storage16Bit ? 4 : !limits.storage8Bit ? 2 : 1;
+/// Reduces a case to what the device supports.
+OutputCase supported(OutputCase output, const DeviceLimits& limits) {
+  if (limits.maxStorageBuffersPerStage >= storageBuffersWanted) return output;
   OutputLayout& layout = output.layout;
-  for (VertexFormat* format : {&layout.positions, &layout.normals, &layout.tangents}) {
-    if (formatSize(*format) % unit != 0) *format = VertexFormat::float32x4;
-  }
-  layout.gap = (layout.gap + unit - 1) / unit * unit;
-  if (fewBuffers) {
-    if (layout.arrangement == Arrangement::separate) layout.arrangement = Arrangement::planar;
-    if (layout.positions == VertexFormat::snorm16x4) layout.positions = VertexFormat::float16x4;
-    layout.bounds = false;
-  }
+  if (layout.arrangement == Arrangement::separate) layout.arrangement = Arrangement::planar;
+  if (layout.positions == VertexFormat::snorm16x3) layout.positions = VertexFormat::float16x3;
+  if (layout.positions == VertexFormat::snorm16x4) layout.positions = VertexFormat::float16x4;
+  layout.bounds = false;
   return output;
 }
 
@@ -196,7 +233,8 @@ std::string OutputCase::name() const {
     text += ", tangents " + std::string(formatName(layout.tangents));
   text += layout.arrangement == Arrangement::interleaved ? ", interleaved"
           : layout.arrangement == Arrangement::planar    ? ", planar"
-                                                         : ", separate";
+          : layout.arrangement == Arrangement::separate  ? ", separate"
+                                                         : ", directions together";
   if (layout.gap != 0) text += ", gaps of " + std::to_string(layout.gap);
   if (layout.motion == Motion::kept) text += ", previous kept";
   if (layout.bounds) text += ", bounds";
@@ -217,12 +255,19 @@ std::string RandomCase::inputName() const {
   return text + ", " + poses[static_cast<std::size_t>(rigidity)];
 }
 
-std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage) {
+std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage,
+                                    std::span<const MeshInfo> meshes) {
   const OutputValues values = outputValues(coverage);
+  const MeshInfo complete = completeMesh();
+  if (meshes.empty()) meshes = {&complete, 1};
   std::vector<OutputCase> cases;
-  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(values.counts())) {
+  const auto isPossible = [&](std::span<const std::uint32_t> chosen) {
+    return areRunsPossible(values, chosen, meshes);
+  };
+  for (const std::vector<std::uint32_t>& combination :
+       pairwiseCombinations(values.counts(), isPossible)) {
     Choice choice(combination);
-    cases.push_back(storable(chooseOutput(choice, values), limits));
+    cases.push_back(supported(chooseOutput(choice, values), limits));
   }
   return cases;
 }
@@ -235,7 +280,11 @@ std::vector<RandomCase> randomCases(const BatchTarget& target, Coverage coverage
   for (const std::vector<std::uint32_t>& others : {inputs.counts(), outputs.counts()})
     counts.insert(counts.end(), others.begin(), others.end());
   std::vector<RandomCase> cases;
-  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(counts)) {
+  const MeshInfo complete = completeMesh();
+  const auto isPossible = [&](std::span<const std::uint32_t> chosen) {
+    return areRunsPossible(outputs, chosen.last(outputs.counts().size()), {&complete, 1});
+  };
+  for (const std::vector<std::uint32_t>& combination : pairwiseCombinations(counts, isPossible)) {
     Choice choice(combination);
     RandomCase random;
     random.method = choice.of(methods);
@@ -252,7 +301,7 @@ std::vector<RandomCase> randomCases(const BatchTarget& target, Coverage coverage
     random.input.gap = choice.of(inputs.gaps);
     if (random.input.joints == ComponentType::uint8)
       random.joints = std::min(random.joints, std::uint32_t{256});
-    random.output = storable(chooseOutput(choice, outputs), target.limits());
+    random.output = supported(chooseOutput(choice, outputs), target.limits());
     cases.push_back(random);
   }
   return cases;

@@ -13,15 +13,15 @@
 
 namespace dermis::samples {
 
-/// The verified formats.
+/// The verified formats. No run of attributes may have snorm8x3.
 inline constexpr std::array verifiedPositionFormats{
     VertexFormat::float32x3, VertexFormat::float32x4, VertexFormat::float16x3,
     VertexFormat::float16x4, VertexFormat::snorm16x3, VertexFormat::snorm16x4};
 inline constexpr std::array verifiedNormalFormats{
-    VertexFormat::none,           VertexFormat::float32x3,    VertexFormat::float32x4,
-    VertexFormat::float16x3,      VertexFormat::float16x4,    VertexFormat::snorm16x3,
-    VertexFormat::snorm16x4,      VertexFormat::snorm8x3,     VertexFormat::snorm8x4,
-    VertexFormat::octahedral16x2, VertexFormat::octahedral8x2};
+    VertexFormat::none,         VertexFormat::float32x3, VertexFormat::float32x4,
+    VertexFormat::float16x3,    VertexFormat::float16x4, VertexFormat::snorm16x3,
+    VertexFormat::snorm16x4,    VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
+    VertexFormat::octahedral8x2};
 inline constexpr std::array verifiedTangentFormats{
     VertexFormat::none,         VertexFormat::float32x4, VertexFormat::float16x4,
     VertexFormat::snorm16x4,    VertexFormat::snorm8x4,  VertexFormat::octahedral16x2,
@@ -40,9 +40,11 @@ enum class Coverage : std::uint8_t {
   quick,  ///< common values, and one of each kind
 };
 
-/// Output cases that combine every two values of two parameters, as far as a device with these
-/// limits supports them.
-std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage = Coverage::full);
+/// Output cases that combine every two values of two parameters, as far as `OutputAttribute` allows
+/// for these meshes, and a device with these limits supports them. No meshes: one with all
+/// attributes.
+std::vector<OutputCase> outputCases(const DeviceLimits& limits, Coverage coverage = Coverage::full,
+                                    std::span<const MeshInfo> meshes = {});
 
 /// One instance to verify. Spans and views refer to the caller's memory.
 struct InstanceToVerify {

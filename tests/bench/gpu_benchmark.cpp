@@ -200,8 +200,6 @@ class Measurement {
            const Tuning& tuning, std::uint32_t count) {
     const std::vector<samples::SkinRequest> requests = crowd_.requests(layout.method, count);
     const Result<void> added = batches.add(requests, layout.output, tuning);
-    // A device that stores no less than a word.
-    if (!added && added.error().code == ErrorCode::missingFeature) return;
     if (!added) stop(added.error());
     Row row;
     row.section = section;

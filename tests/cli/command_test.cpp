@@ -350,15 +350,6 @@ std::string describe(const samples::Device& device) {
   const samples::VulkanFunctions& functions = device.functions();
   VkPhysicalDeviceProperties properties{};
   functions.GetPhysicalDeviceProperties(device.physicalDevice(), &properties);
-  VkPhysicalDevice8BitStorageFeatures bytes{};
-  bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-  halves.pNext = &bytes;
-  VkPhysicalDeviceFeatures2 features{};
-  features.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
-  features.pNext = &halves;
-  functions.GetPhysicalDeviceFeatures2(device.physicalDevice(), &features);
   std::uint32_t count = 0;
   functions.EnumerateDeviceExtensionProperties(device.physicalDevice(), nullptr, &count, nullptr);
   std::vector<VkExtensionProperties> extensions(count);
@@ -378,9 +369,7 @@ std::string describe(const samples::Device& device) {
        << (properties.limits.maxStorageBufferRange >> 20) << " MiB; "
        << properties.limits.maxPerStageDescriptorStorageBuffers << " storage buffers per stage; "
        << properties.limits.maxComputeWorkGroupCount[0]
-       << " workgroups per dimension; push descriptors: " << yes(pushes)
-       << "; 16-bit stores: " << yes(halves.storageBuffer16BitAccess == VK_TRUE)
-       << "; 8-bit stores: " << yes(bytes.storageBuffer8BitAccess == VK_TRUE) << '\n';
+       << " workgroups per dimension; push descriptors: " << yes(pushes) << '\n';
   return text.str();
 }
 

@@ -326,25 +326,25 @@ TEST_F(DecodeTest, AVertexShaderDecodesWhatTheKernelsStore) {
   request.box = {{-30, -20, -25}, {30, 40, 35}};
   samples::RunOptions options;
   options.output.positions = VertexFormat::snorm16x4;
-  options.output.normals = VertexFormat::octahedral16x2;
+  options.output.normals = VertexFormat::octahedral8x2;
   options.output.tangents = VertexFormat::octahedral8x2;
   const samples::BatchResult result =
       must(samples::runBatch(device(), context(), {&request, 1}, options));
   const samples::SkinnedVertices& skinned = result.instances[0];
 
-  constexpr std::uint32_t stride = 16;
+  constexpr std::uint32_t stride = 12;
   const MappedBuffer vertices = must(MappedBuffer::create(
       device(), std::uint64_t{vertexCount} * stride, VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
   for (std::size_t vertex = 0; vertex < vertexCount; ++vertex) {
     std::byte* place = vertices.bytes().data() + vertex * stride;
     std::memcpy(place, skinned.streams[0].data() + vertex * 8, 8);
-    std::memcpy(place + 8, skinned.streams[1].data() + vertex * 4, 4);
-    std::memcpy(place + 12, skinned.streams[2].data() + vertex * 2, 2);
+    std::memcpy(place + 8, skinned.streams[1].data() + vertex * 2, 2);
+    std::memcpy(place + 10, skinned.streams[2].data() + vertex * 2, 2);
   }
   const std::array<VkVertexInputAttributeDescription, 3> attributes{
       {{0, 0, VK_FORMAT_R16G16B16A16_SNORM, 0},
-       {1, 0, VK_FORMAT_R16G16_SNORM, 8},
-       {2, 0, VK_FORMAT_R8G8_SNORM, 12}}};
+       {1, 0, VK_FORMAT_R8G8_SNORM, 8},
+       {2, 0, VK_FORMAT_R8G8_SNORM, 10}}};
   ValueDrawer::Inputs inputs;
   inputs.vertices = &vertices;
   inputs.attributes = attributes;
@@ -358,7 +358,7 @@ TEST_F(DecodeTest, AVertexShaderDecodesWhatTheKernelsStore) {
     const std::array<double, 3> position = decodePosition(
         VertexFormat::snorm16x4, skinned.streams[0].data() + vertex * 8, request.box);
     const std::array<double, 3> normal =
-        decodeNormal(VertexFormat::octahedral16x2, skinned.streams[1].data() + vertex * 4);
+        decodeNormal(VertexFormat::octahedral8x2, skinned.streams[1].data() + vertex * 2);
     const std::array<double, 4> tangent =
         decodeTangent(VertexFormat::octahedral8x2, skinned.streams[2].data() + vertex * 2);
     for (std::size_t axis = 0; axis < 3; ++axis) {

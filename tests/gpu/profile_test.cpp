@@ -45,7 +45,7 @@ TEST_F(ProfileTest, TheDeviceLooksLikeIt) {
 
 TEST_F(ProfileTest, SomeCombinationsAreInsideTheirBounds) {
   samples::VulkanTarget target(device(), context());
-  verifyProduct(target, 20);
+  verifyProduct(target, 16);
 }
 
 // Defaults of a kind of device: reads, stores, and the tuning.

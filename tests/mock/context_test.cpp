@@ -212,6 +212,8 @@ DeviceLimits limitsWith(const void* enabledFeatures) {
   MockVulkan mock;
   vulkan::DeviceDescription description = mock.description();
   description.enabledFeatures = enabledFeatures;
+  description.texelBuffers = true;
+  mock.limits.maxTexelBufferElements = mock.limits.maxStorageBufferRange / 4;
   const Result<vulkan::Context> context = vulkan::Context::create(description);
   EXPECT_TRUE(context.ok());
   return context->limits();
@@ -220,8 +222,7 @@ DeviceLimits limitsWith(const void* enabledFeatures) {
 /// The structures that an engine may have chained, none of them enabling anything that is used; and
 /// some that Dermis does not know, of which every word is true.
 struct FeatureChain {
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  VkPhysicalDevice8BitStorageFeatures bytes{};
+  VkPhysicalDeviceScalarBlockLayoutFeatures scalar{};
   VkPhysicalDeviceVulkan11Features vulkan11{};
   VkPhysicalDeviceVulkan12Features vulkan12{};
   VkPhysicalDeviceFeatures2 features2{};
@@ -229,22 +230,17 @@ struct FeatureChain {
   std::vector<VkBaseOutStructure*> order;
 
   FeatureChain() {
-    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
+    scalar.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;
     vulkan11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
     vulkan12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     features2.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     pointers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VARIABLE_POINTERS_FEATURES;
     // Neighbors of the members that are meant.
-    halves.uniformAndStorageBuffer16BitAccess = vulkan11.uniformAndStorageBuffer16BitAccess =
-        VK_TRUE;
-    halves.storagePushConstant16 = vulkan11.storagePushConstant16 = VK_TRUE;
-    bytes.uniformAndStorageBuffer8BitAccess = vulkan12.uniformAndStorageBuffer8BitAccess = VK_TRUE;
-    vulkan12.drawIndirectCount = vulkan12.samplerMirrorClampToEdge = VK_TRUE;
-    features2.features.robustBufferAccess = features2.features.fullDrawIndexUint32 = VK_TRUE;
+    vulkan11.storageBuffer16BitAccess = vulkan11.storagePushConstant16 = VK_TRUE;
+    vulkan12.imagelessFramebuffer = vulkan12.uniformBufferStandardLayout = VK_TRUE;
+    features2.features.shaderFloat64 = features2.features.shaderInt16 = VK_TRUE;
     pointers.variablePointersStorageBuffer = pointers.variablePointers = VK_TRUE;
-    order = {base(halves),   base(bytes),     base(vulkan11),
-             base(vulkan12), base(features2), base(pointers)};
+    order = {base(scalar), base(vulkan11), base(vulkan12), base(features2), base(pointers)};
     std::sort(order.begin(), order.end());
   }
   FeatureChain(const FeatureChain&) = delete;
@@ -261,39 +257,25 @@ struct FeatureChain {
   }
 };
 
-TEST(ContextTest, WithoutFeaturesWordsAreStored) {
-  EXPECT_FALSE(limitsWith(nullptr).storage16Bit);
-  EXPECT_FALSE(limitsWith(nullptr).storage8Bit);
-}
-
 TEST(ContextTest, FeaturesAreFoundInAnyOrderOfTheChain) {
+  EXPECT_FALSE(limitsWith(nullptr).texelBuffers);
   FeatureChain features;
-  const auto expectAll = [&](bool halves, bool bytes) {
+  const auto expectAll = [&](bool texelBuffers) {
     std::sort(features.order.begin(), features.order.end());
-    int orders = 0;
     do {
-      // All 720 orders of each are more than is needed.
-      if (orders++ % 7 != 0) continue;
-      const DeviceLimits limits = limitsWith(features.chain());
-      ASSERT_EQ(limits.storage16Bit, halves);
-      ASSERT_EQ(limits.storage8Bit, bytes);
+      ASSERT_EQ(limitsWith(features.chain()).texelBuffers, texelBuffers);
     } while (std::next_permutation(features.order.begin(), features.order.end()));
-    ASSERT_EQ(orders, 720);
   };
-  expectAll(false, false);
+  expectAll(false);
   for (VkBool32* enabled :
-       {&features.halves.storageBuffer16BitAccess, &features.vulkan11.storageBuffer16BitAccess}) {
+       {&features.scalar.scalarBlockLayout, &features.vulkan12.scalarBlockLayout}) {
     *enabled = VK_TRUE;
-    expectAll(true, false);
+    expectAll(false);
+    features.features2.features.shaderInt64 = VK_TRUE;
+    expectAll(true);
     *enabled = VK_FALSE;
-  }
-  for (VkBool32* enabled :
-       {&features.bytes.storageBuffer8BitAccess, &features.vulkan12.storageBuffer8BitAccess}) {
-    *enabled = VK_TRUE;
-    expectAll(false, true);
-    features.vulkan11.storageBuffer16BitAccess = VK_TRUE;
-    expectAll(true, true);
-    features.vulkan11.storageBuffer16BitAccess = *enabled = VK_FALSE;
+    expectAll(false);
+    features.features2.features.shaderInt64 = VK_FALSE;
   }
 }
 
@@ -356,32 +338,14 @@ TEST(ContextTest, ModulesAreCreatedForThePipelinesThatAreBuilt) {
 TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
   MockVulkan mock;
   Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{1, 2}) {
-    for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      Variant variant;
-      variant.units[stream] = unit;
-      const Result<void> prepared = context->prepare({&variant, 1});
-      ASSERT_FALSE(prepared.ok());
-      EXPECT_EQ(prepared.error().code, ErrorCode::missingFeature);
-      EXPECT_NE(prepared.error().message.find("storageBuffer16BitAccess"), std::string::npos);
-    }
-  }
-  EXPECT_TRUE(mock.modules.empty()) << "a module needs the feature, too";
-  EXPECT_EQ(mock.alive["Pipeline"], 0);
-
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-  halves.storageBuffer16BitAccess = VK_TRUE;
-  vulkan::DeviceDescription description = mock.description();
-  description.enabledFeatures = &halves;
-  context = vulkan::Context::create(description);
   Variant variant;
-  variant.units[0] = 2;
-  EXPECT_TRUE(context->prepare({&variant, 1}).ok());
-  variant.units[0] = 1;
+  variant.texels = true;
   const Result<void> prepared = context->prepare({&variant, 1});
   ASSERT_FALSE(prepared.ok());
-  EXPECT_NE(prepared.error().message.find("storageBuffer8BitAccess"), std::string::npos);
+  EXPECT_EQ(prepared.error().code, ErrorCode::missingFeature);
+  EXPECT_NE(prepared.error().message.find("scalarBlockLayout"), std::string::npos);
+  EXPECT_TRUE(mock.modules.empty()) << "a module needs the feature, too";
+  EXPECT_EQ(mock.alive["Pipeline"], 0);
 }
 
 // ---- Kernels as data
@@ -392,10 +356,10 @@ TEST(KernelsTest, SpirvIsThereWithoutADevice) {
     DeviceLimits limits = richLimits();
     limits.maxStorageBuffersPerStage = storageBuffers;
     for (const Kernel kernel : {Kernel::palette, Kernel::clear, Kernel::skin}) {
-      for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{1, 2, 4}) {
+      for (const bool texels : {false, true}) {
         Variant variant;
         variant.kernel = kernel;
-        variant.units[3] = unit;
+        variant.texels = texels;
         const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
         ASSERT_GT(spirv.size(), 5u);
         EXPECT_EQ(spirv[0], 0x07230203u);
@@ -404,19 +368,7 @@ TEST(KernelsTest, SpirvIsThereWithoutADevice) {
       }
     }
   }
-  EXPECT_EQ(modules.size(), 6u) << "palettes, results, words, halves, bytes, one output";
-}
-
-TEST(KernelsTest, TheSmallestUnitChoosesTheModule) {
-  const auto code = [](std::array<std::uint8_t, streamCount> units) {
-    Variant variant;
-    variant.units = units;
-    return vulkan::kernelSpirv(variant, richLimits()).data();
-  };
-  EXPECT_EQ(code({4, 2, 4, 4}), code({2, 2, 2, 2}));
-  EXPECT_EQ(code({4, 2, 1, 4}), code({1, 1, 1, 1}));
-  EXPECT_NE(code({4, 4, 4, 4}), code({4, 4, 4, 2}));
-  EXPECT_NE(code({4, 4, 4, 1}), code({4, 4, 4, 2}));
+  EXPECT_EQ(modules.size(), 5u) << "palettes, results, words, texels, one output";
 }
 
 TEST(KernelsTest, ConstantsStandAtTheirIds) {
@@ -425,7 +377,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.positions = VertexFormat::snorm16x4;
   variant.normals = VertexFormat::octahedral8x2;
   variant.tangents = VertexFormat::snorm8x4;
-  variant.units = {4, 2, 1, 2};
+  variant.wide = {true, false, true, true};
   variant.motion = Motion::kept;
   variant.morphs = true;
   variant.bounds = true;
@@ -445,10 +397,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_POSITION_FORMAT, abi::FORMAT_SNORM16X4},
       {abi::CONSTANT_NORMAL_FORMAT, abi::FORMAT_OCTAHEDRAL8X2},
       {abi::CONSTANT_TANGENT_FORMAT, abi::FORMAT_SNORM8X4},
-      {abi::CONSTANT_POSITION_UNIT, 4},
-      {abi::CONSTANT_NORMAL_UNIT, 2},
-      {abi::CONSTANT_TANGENT_UNIT, 1},
-      {abi::CONSTANT_PREVIOUS_UNIT, 2},
+      {abi::CONSTANT_WIDE, 0b1101},
       {abi::CONSTANT_MOTION, 1},
       {abi::CONSTANT_MORPHS, 1},
       {abi::CONSTANT_BOUNDS, 1},

@@ -29,6 +29,7 @@
 #include "dermis/vulkan/vertex_input.h"
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
+#include "plan/placement.h"
 #include "scene_meshes.h"
 #include "test_paths.h"
 
@@ -58,13 +59,7 @@ struct Choice {
 class EnumValuesTest : public MockContextTest {
  protected:
   void SetUp() override {
-    VkPhysicalDevice8BitStorageFeatures bytes{};
-    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES;
-    VkPhysicalDevice16BitStorageFeatures halves{};
-    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    halves.pNext = &bytes;
-    bytes.storageBuffer8BitAccess = halves.storageBuffer16BitAccess = VK_TRUE;
-    create(true, {}, &halves);
+    create(true);
     SceneDescription ofScene;
     ofScene.limits = richLimits();
     scene_.emplace(must(Scene::create(ofScene)));
@@ -244,13 +239,16 @@ class EnumValuesTest : public MockContextTest {
         compareWithReference(must(reference::skin(source_.view(), pose_, Method::linear)), view));
   }
 
-  /// Passes 0 to 255 in one member of the choice to every function that reads it.
+  /// Passes 0 to 255 in one member of the choice to every function that reads it. Leaves out
+  /// formats that a planar layout may have on the CPU only.
   void expectChecked(const std::string& member,
                      const std::function<void(Choice&, std::uint32_t)>& set,
                      const std::function<bool(std::uint32_t)>& isValue) {
     for (std::uint32_t value = 0; value < 256; ++value) {
       Choice choice;
       set(choice, value);
+      const VertexLayout& layout = choice.layout;
+      if (shareWords(layout.positions, layout.normals, layout.tangents)) continue;
       for (const Entry& entry : entries()) {
         if (!entry.reads.contains(member)) continue;
         SCOPED_TRACE(entry.name + ", " + member + " " + std::to_string(value));
@@ -338,11 +336,6 @@ TEST_F(EnumValuesTest, NoVariantPoisonsThePipelinesOfAnother) {
   std::set<std::uint32_t> upTo32;
   for (std::uint32_t instances = 1; instances <= 32; ++instances) upTo32.insert(instances);
   expectOnly(&Variant::instancesPerInvocation, upTo32, "instancesPerInvocation");
-  for (const std::uint8_t unit : std::array<std::uint8_t, 6>{0, 3, 5, 20, 32, 255}) {
-    Variant variant;
-    variant.units[2] = unit;
-    EXPECT_TRUE(isInvalid(context->prepare({&variant, 1}))) << int{unit};
-  }
   // Tunings that plans refuse have no variants, for the same reason.
   for (const Tuning& tuning : {Tuning{.workgroupSize = 65600}, Tuning{.workgroupSize = 256},
                                Tuning{.instancesPerInvocation = 64}}) {

@@ -434,17 +434,12 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     VkPhysicalDeviceFeatures2 integers{};
     integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
     integers.features.shaderInt64 = VK_TRUE;
-    VkPhysicalDeviceVulkan12Features bytes{};
-    bytes.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
-    bytes.storageBuffer8BitAccess = VK_TRUE;
-    bytes.scalarBlockLayout = seed % 8 < 4 ? VK_TRUE : VK_FALSE;
-    bytes.pNext = &integers;
-    VkPhysicalDevice16BitStorageFeatures halves{};
-    halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-    halves.storageBuffer16BitAccess = VK_TRUE;
-    halves.pNext = &bytes;
+    VkPhysicalDeviceVulkan12Features scalar{};
+    scalar.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    scalar.scalarBlockLayout = seed % 8 < 4 ? VK_TRUE : VK_FALSE;
+    scalar.pNext = &integers;
     vulkan::DeviceDescription description = mock.description();
-    description.enabledFeatures = &halves;
+    description.enabledFeatures = &scalar;
     description.texelBuffers = true;
     Result<vulkan::Context> made = vulkan::Context::create(description);
     ASSERT_TRUE(made.ok());
@@ -464,14 +459,11 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
 }
 
 TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
-  VkPhysicalDevice16BitStorageFeatures halves{};
-  halves.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES;
-  halves.storageBuffer16BitAccess = VK_TRUE;
-  ASSERT_NO_FATAL_FAILURE(create(true, {}, &halves));
+  ASSERT_NO_FATAL_FAILURE(create());
   MockBatch batch = richBatch(context->limits());
-  Job halved = batch.batch.jobOf(0, 0, Method::linear);
-  halved.positions.format = VertexFormat::float16x3;
-  batch.batch.place(halved, Arrangement::separate);
+  Job other = batch.batch.jobOf(0, 0, Method::linear);
+  other.positions.format = VertexFormat::float16x4;
+  batch.batch.place(other, Arrangement::separate);
   batch.makePlan(context->limits());
   ASSERT_TRUE(record(batch).ok());
   ASSERT_EQ(mock.dispatches.size(), 5u);
@@ -560,7 +552,7 @@ TEST_F(RecordTest, APlanForOtherLimitsIsRefused) {
   DeviceLimits other[] = {context->limits(), context->limits(), context->limits()};
   other[0].maxStorageBufferRange = 1 << 28;
   other[1].maxStorageBuffersPerStage = 9;
-  other[2].storage16Bit = true;
+  other[2].stagedStores = !other[2].stagedStores;
   for (const DeviceLimits& limits : other) {
     const MockBatch batch = MockBatch::withAllMethods(limits);
     expectRefused(batch, batch.buffers(), ErrorCode::invalidArgument, "limits of another device");

@@ -143,19 +143,6 @@ TEST_F(MockTexelTest, ADeviceWithFewTexelsReadsStorageBuffers) {
   EXPECT_TRUE(context->limits().texelBuffers);
 }
 
-TEST_F(MockTexelTest, VariantsThatStoreLessThanAWordReadStorageBuffers) {
-  DeviceLimits limits = richLimits();
-  limits.texelBuffers = true;
-  MockBatch batch;
-  Job job = batch.batch.jobOf(0, 0, Method::dualQuaternion);
-  job.positions.format = VertexFormat::float16x3;
-  batch.batch.place(job, Arrangement::separate);
-  batch.makePlan(limits);
-  ASSERT_EQ(batch.plan.variants().size(), 2u);
-  EXPECT_EQ(batch.plan.variants()[1].units[0], 2);
-  EXPECT_FALSE(batch.plan.variants()[1].texels);
-}
-
 // Positions and normals that stand together are stored together.
 TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
   DeviceLimits limits = richLimits();
@@ -213,29 +200,43 @@ TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirS
   EXPECT_EQ(record(float32x4, float32x4), 32);
   EXPECT_EQ(record(float16x4, octahedral16x2), 12);
   EXPECT_EQ(record(snorm16x4, snorm8x4, snorm8x4), 16);
-  EXPECT_EQ(record(float16x3, octahedral8x2), 8);  // no store of less than a word
+  EXPECT_EQ(record(float16x3, octahedral8x2), 8);
   EXPECT_EQ(record(float16x3, octahedral8x2, octahedral16x2), 12);
-  EXPECT_EQ(record(float16x3, octahedral16x2), 0);   // 10 bytes
+  EXPECT_EQ(record(float32x3, octahedral8x2, octahedral8x2), 16);
   EXPECT_EQ(record(float32x3, none, float32x4), 0);  // 28 bytes
   EXPECT_EQ(record(float32x3, none), 0);
-  EXPECT_EQ(variantOf({.positions = float32x3}).units[0], 12);
-  EXPECT_EQ(variantOf({.positions = float32x3, .stride = 16}).units[0], 4);
+  EXPECT_TRUE(variantOf({.positions = float32x3}).wide[0]);
+  EXPECT_FALSE(variantOf({.positions = float32x3, .stride = 16}).wide[0]);
   // Previous positions, and attributes of the engine's, are no part of the record.
   const Variant kept = variantOf({.normals = float32x3, .motion = Motion::kept});
   EXPECT_EQ(kept.recordBytes, 0);  // at multiples of 36 bytes
-  EXPECT_EQ(kept.units, (std::array<std::uint8_t, streamCount>{12, 12, 4, 12}));
+  EXPECT_EQ(kept.wide, (std::array{true, true, false, true}));
   EXPECT_EQ(variantOf({.normals = float32x3, .stride = 48}).recordBytes, 24);
   const Variant between = variantOf({.normals = float32x3, .stride = 32});
   EXPECT_TRUE(between.recordBytes == 0 && between.pairs);
   const Variant planar =
       variantOf({.normals = float16x4, .arrangement = dermis::Arrangement::planar}, 48);
   EXPECT_EQ(planar.recordBytes, 0);
-  EXPECT_EQ(planar.units, (std::array<std::uint8_t, streamCount>{12, 8, 4, 4}));
-  // Previous positions would be stored by 2 bytes.
-  const Variant halves = variantOf(
-      {.positions = float16x3, .normals = octahedral8x2, .motion = Motion::kept, .stride = 16});
-  EXPECT_FALSE(halves.texels || halves.recordBytes != 0);
-  EXPECT_EQ(halves.units, (std::array<std::uint8_t, streamCount>{2, 2, 4, 2}));
+  EXPECT_EQ(planar.wide, (std::array{true, true, false, false}));
+}
+
+TEST_F(MockTexelTest, APlanWithSharedWordsNeedsOneOutputBuffer) {
+  ASSERT_NO_FATAL_FAILURE(create(false, false));
+  MockBatch batch;
+  batch.batch.addMesh(meshOf(10, 2, 4, MeshParts{true, true, 0}));
+  Job job = batch.batch.jobOf(1, 0, Method::dualQuaternion);
+  job.normals.format = job.tangents.format = VertexFormat::octahedral8x2;
+  batch.batch.place(job, Arrangement::interleaved);
+  batch.makePlan(context->limits());
+  vulkan::BatchBuffers buffers = batch.buffers();
+  EXPECT_TRUE(record(batch, buffers).ok());
+  for (const auto& [range, role] : {std::pair{&buffers.outputs.normals, BufferRole::normals},
+                                    {&buffers.outputs.tangents, BufferRole::tangents}}) {
+    const vulkan::BufferRange good = *range;
+    range->buffer = bufferOf(role);
+    expectRefused(batch, buffers, ErrorCode::invalidArgument, "one buffer");
+    *range = good;
+  }
 }
 
 TEST_F(MockTexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {

@@ -4,7 +4,7 @@
 #   tests/package/sizes.sh KERNELS FOLDER
 #
 # KERNELS is the folder of dermis_kernels.cpp: BUILD/shaders/dermis_kernels. FOLDER receives the builds. $CXX is the compiler; the
-# default is c++. "Lean" means without DERMIS_COMPARISON_METHODS and DERMIS_SUBWORD_STORES. Everything is built with CMake's Release
+# default is c++. "Lean" means without DERMIS_COMPARISON_METHODS. Everything is built with CMake's Release
 # flags and stripped.
 set -eu
 source=$(cd "$(dirname "$0")/../.." && pwd)
@@ -35,7 +35,7 @@ measure() { # ON|OFF: the lines of the table, NAME|SIZE
   for shared in OFF ON; do
     build=$folder/shared-$shared
     quietly cmake -S "$source" -B "$build" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release "-DDERMIS_EMBEDDED_SHADERS=$kernels" \
-      "-DBUILD_SHARED_LIBS=$shared" "-DDERMIS_COMPARISON_METHODS=$1" "-DDERMIS_SUBWORD_STORES=$1" -DDERMIS_BUILD_CPU=OFF \
+      "-DBUILD_SHARED_LIBS=$shared" "-DDERMIS_COMPARISON_METHODS=$1" -DDERMIS_BUILD_CPU=OFF \
       -DDERMIS_BUILD_GLTF=OFF -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=OFF -DDERMIS_BUILD_SHADER_COMPILER=OFF
     quietly cmake --build "$build"
     for library in core vulkan; do

@@ -18,8 +18,8 @@ set(kernels)
 if(COMPILER STREQUAL ownCompiler)
   set(kernels "-DDERMIS_EMBEDDED_SHADERS=${buildFolder}/shaders/dermis_kernels")
 endif()
-# Without the kernels that most engines do not need; those for comparison are left out unless one asks.
-build_consumer("${engine}" ${kernels} -DDERMIS_SUBWORD_STORES=OFF -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
+# Without the kernels for comparison, which are left out unless one asks.
+build_consumer("${engine}" ${kernels} -DCMAKE_DISABLE_FIND_PACKAGE_glm=TRUE "-DGLM_FOLDERS=${glmFolders}")
 file(STRINGS "${BUILD}/CMakeCache.txt" compares REGEX "^DERMIS_COMPARISON_METHODS:BOOL=OFF$")
 if(NOT compares)
   wrong("a subproject has the kernels that are for comparison")

@@ -49,6 +49,7 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::none; });
   add([](InstanceDescription& wrong) { wrong.layout.tangents = VertexFormat::float16x3; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1}; });
+  add([](InstanceDescription& wrong) { wrong.layout = {.stride = 26}; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1 << 20}; });
   add([](InstanceDescription& wrong) {
     wrong.layout.positions = VertexFormat::snorm16x4;

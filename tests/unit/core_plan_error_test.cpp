@@ -285,7 +285,8 @@ TEST_F(PlanErrors, FormatsThatAnAttributeMayNotHave) {
       const std::string format = number <= allVertexFormats.size()
                                      ? std::string(formatName(allowed.format))
                                      : std::to_string(number);
-      expectGoodOnlyIf(isAllowed, ErrorCode::invalidArgument, {"job 1", name, format.c_str()});
+      expectGoodOnlyIf(isAllowed && formatSize(allowed.format) % 4 == 0, ErrorCode::invalidArgument,
+                       {"job 1", name, format.c_str()});
     }
   }
 }
@@ -299,59 +300,149 @@ TEST_F(PlanErrors, TheFormatOfPreviousPositionsIsNotLookedAt) {
   expectInvalid({"job 1", "previous positions", "size 12"});
 }
 
-// ---- Stores of less than a word
+// ---- Runs of attributes
 
-TEST_F(PlanErrors, AttributesThatDoNotFillWholeWordsNeedFeatures) {
-  struct Case {
-    OutputAttribute attribute;
-    int unit;
-  };
-  const Case cases[] = {
-      {{0, 12, VertexFormat::float32x3}, 4},    {{2, 12, VertexFormat::float32x3}, 2},
-      {{1, 12, VertexFormat::float32x3}, 1},    {{0, 14, VertexFormat::float32x3}, 2},
-      {{0, 13, VertexFormat::float32x3}, 1},    {{0, 8, VertexFormat::float16x3}, 2},
-      {{0, 7, VertexFormat::float16x3}, 1},     {{4, 8, VertexFormat::float16x4}, 4},
-      {{0, 8, VertexFormat::snorm16x3}, 2},     {{0, 8, VertexFormat::snorm16x4}, 4},
-      {{0, 4, VertexFormat::snorm8x3}, 1},      {{0, 4, VertexFormat::snorm8x4}, 4},
-      {{6, 4, VertexFormat::snorm8x4}, 2},      {{0, 4, VertexFormat::octahedral16x2}, 4},
-      {{0, 4, VertexFormat::octahedral8x2}, 2}, {{0, 3, VertexFormat::octahedral8x2}, 1}};
-  for (const auto& [attribute, unit] : cases) {
-    job().normals = attribute;
-    const std::string offset = "offset " + std::to_string(attribute.offset);
-    const std::string stride = "stride " + std::to_string(attribute.stride);
-    SCOPED_TRACE(offset + ", " + stride + " " + std::string(formatName(attribute.format)));
-    for (const bool halves : {false, true}) {
-      for (const bool bytes : {false, true}) {
-        limits.storage16Bit = halves;
-        limits.storage8Bit = bytes;
-        if (unit == 4 || (halves && (unit == 2 || bytes))) {
-          expectGood();
-          continue;
-        }
-        const char* feature =
-            unit == 2 ? "storageBuffer16BitAccess" : "storageBuffer8BitAccess and storageBuffer16";
-        expectRefused(ErrorCode::missingFeature, {"job 1", "normals", offset.c_str(),
-                                                  stride.c_str(), "multiples of 4", feature});
+/// Bytes from the beginning of a vertex, and the format.
+struct Part {
+  std::uint64_t place = 0;
+  VertexFormat format = VertexFormat::none;
+};
+
+struct RunErrors : public PlanErrors {
+  /// Vertices of `stride` bytes, the first at byte 8.
+  void place(std::uint32_t stride, Part positions, Part normals = {}, Part tangents = {}) {
+    job().positions = {8 + positions.place, stride, positions.format};
+    job().normals = {8 + normals.place, stride, normals.format};
+    job().tangents = {8 + tangents.place, stride, tangents.format};
+    job().box = {{0, 0, 0}, {1, 1, 1}};
+  }
+  /// On every device.
+  void expectRefusedRun(std::initializer_list<const char*> parts) {
+    for (const std::uint32_t buffers : {4u, 8u}) {
+      limits.maxStorageBuffersPerStage = buffers;
+      for (const bool texels : {false, true}) {
+        limits.texelBuffers = texels;
+        expectInvalid(parts);
       }
     }
+    EXPECT_FALSE(everyVariant(job(), limits, tuning).ok());
+  }
+};
+
+using enum VertexFormat;
+
+TEST_F(RunErrors, RunsOfWholeWordsAreGood) {
+  for (const std::uint32_t buffers : {4u, 8u}) {
+    limits.maxStorageBuffersPerStage = buffers;
+    for (const auto& [positions, normals, tangents] : {std::array{float16x3, octahedral8x2, none},
+                                                       {float16x3, float16x3, none},
+                                                       {float16x3, none, octahedral8x2},
+                                                       {float32x3, octahedral8x2, octahedral8x2},
+                                                       {float16x3, snorm16x3, float32x4},
+                                                       {float16x3, float16x4, octahedral8x2},
+                                                       {float16x4, float16x3, octahedral8x2},
+                                                       {float32x4, octahedral8x2, octahedral8x2}}) {
+      const std::uint32_t first = formatSize(positions), second = first + formatSize(normals);
+      for (const std::uint32_t stride : {32u, 36u}) {
+        place(stride, {0, positions}, {first, normals}, {second, tangents});
+        expectGood();
+        EXPECT_TRUE(everyVariant(job(), limits, tuning).ok());
+      }
+    }
+    // The directions of a vertex in an array of their own.
+    place(12, {0, float32x3});
+    job().normals = {200, 4, octahedral8x2};
+    job().tangents = {202, 4, octahedral8x2};
+    expectGood();
+    // Only the first run has the gap.
+    place(24, {0, float16x3}, {6, octahedral8x2}, {12, octahedral16x2});
+    expectGood();
   }
 }
 
-TEST_F(PlanErrors, EveryAttributeThatDoesNotFillWholeWordsNeedsThem) {
-  limits.storage16Bit = limits.storage8Bit = false;
-  job().tangents = {0, 16, VertexFormat::float32x4};
+// The message says which format fits.
+TEST_F(RunErrors, RunsOfOtherLengths) {
+  place(8, {0, float16x3});
+  expectRefusedRun(
+      {"job 1: its positions as float16x3 are in a run of 6 bytes, which is not a "
+       "multiple of 4; use float16x4"});
+  place(8, {0, float16x3}, {8, octahedral16x2});
+  job().normals.stride = 12;
+  expectRefusedRun({"positions as float16x3", "6 bytes"});
+  place(16, {0, float32x3}, {12, octahedral8x2});
+  expectRefusedRun({"normals as octahedral8x2", "14 bytes", "use octahedral16x2"});
+  place(16, {0, float32x3}, {12, snorm8x3});
+  expectRefusedRun({"normals as snorm8x3", "15 bytes", "use snorm8x4"});
+  place(24, {0, float32x3}, {12, snorm8x3}, {15, octahedral16x2});
+  expectRefusedRun({"normals as snorm8x3", "19 bytes", "use snorm8x4"});
+  place(16, {0, float16x3}, {6, float16x3}, {12, octahedral8x2});
+  expectRefusedRun({"tangents as octahedral8x2", "14 bytes", "use octahedral16x2"});
+  place(16, {0, float16x4}, {8, snorm16x3}, {14, octahedral16x2});
+  expectRefusedRun({"normals as snorm16x3", "18 bytes", "use snorm16x4"});
+  // They would be whole words without the gap.
+  place(12, {0, float16x3}, {8, octahedral8x2});
+  expectRefusedRun({"positions as float16x3", "6 bytes", "use float16x4"});
+  place(20, {0, float32x3}, {12, octahedral8x2}, {16, octahedral8x2});
+  expectRefusedRun({"normals as octahedral8x2", "14 bytes"});
+  // The same, since strides differ.
+  place(8, {0, snorm16x3}, {6, octahedral8x2});
+  job().normals.stride = 12;
+  limits.maxStorageBuffersPerStage = 8;
+  expectInvalid({"positions as snorm16x3", "6 bytes", "use snorm16x4"});
+  // Previous positions are never part of another run.
+  place(16, {0, float16x3}, {6, octahedral8x2});
   job().motion = Motion::kept;
-  job().previousPositions = {0, 12};
-  expectGood();
-  for (const auto& [member, name] : {std::pair{&Job::positions, "positions"},
-                                     {&Job::normals, "normals"},
-                                     {&Job::tangents, "tangents"},
-                                     {&Job::previousPositions, "previous positions"}}) {
-    OutputAttribute& attribute = job().*member;
-    attribute.offset += 2;
-    expectRefused(ErrorCode::missingFeature, {"job 1", name});
-    attribute.offset -= 2;
+  for (const std::uint64_t offset : {16u, 400u}) {
+    job().previousPositions = {offset, 16};
+    expectRefusedRun({"previous positions as float16x3", "6 bytes", "use float16x4"});
   }
+}
+
+TEST_F(RunErrors, RunsThatDoNotBeginAtWords) {
+  place(32, {0, float32x3}, {12, octahedral8x2}, {14, octahedral8x2});
+  job().motion = Motion::kept;
+  job().previousPositions = {400, 12};
+  expectGood();
+  const auto expectNamed = [&](OutputAttribute& attribute, const char* name) {
+    const Job good = job();
+    for (const std::uint32_t moved : {1u, 2u, 3u}) {
+      attribute.offset += moved;
+      expectRefusedRun({"job 1: offset", name, "must be multiples of 4"});
+      attribute.offset -= moved;
+      attribute.stride += moved;
+      expectRefusedRun({"job 1: offset", name, "must be multiples of 4"});
+      job() = good;
+    }
+  };
+  expectNamed(job().previousPositions, "previous positions");
+  place(32, {0, float32x3}, {12, octahedral16x2}, {20, octahedral16x2});
+  expectNamed(job().positions, "positions");
+  expectNamed(job().normals, "normals");
+  expectNamed(job().tangents, "tangents");
+  // A vertex of the whole run.
+  place(18, {0, float16x3}, {6, octahedral8x2});
+  expectRefusedRun({"stride 18"});
+}
+
+// A word that two attributes share is stored in the buffer of the second.
+TEST_F(RunErrors, RunsWithSharedWordsInTwoBuffers) {
+  batch.jobs.erase(batch.jobs.begin() + 2);
+  batch.jobs.erase(batch.jobs.begin());
+  Job& only = batch.jobs[0];
+  only.positions = {0, 12, float32x3};
+  only.normals = {0, 8, octahedral16x2};
+  only.tangents = {4, 8, octahedral16x2};
+  batch.hasSeparateOutputs = true;
+  batch.separateSizes = {120, 80, 80, 0};
+  expectGood();
+  only.normals.format = octahedral8x2;
+  only.tangents = {2, 8, octahedral8x2};
+  expectInvalid({"job 0", "isOneBuffer"});
+  only.normals.offset += 120;
+  only.tangents.offset += 120;
+  batch.hasSeparateOutputs = false;
+  batch.outputSize = 200;
+  expectGood();
 }
 
 // ---- Devices with four storage buffers per stage
@@ -382,17 +473,6 @@ TEST_F(PlanErrors, MethodsForComparisonMayBeLeftOutOfTheLibrary) {
     } else {
       expectGood();
     }
-  }
-}
-
-// The one kernel that such devices have stores words.
-TEST_F(PlanErrors, FewStorageBuffersMeanWholeWords) {
-  limits.maxStorageBuffersPerStage = 4;
-  for (const VertexFormat format :
-       {VertexFormat::octahedral16x2, VertexFormat::octahedral8x2, VertexFormat::snorm8x3}) {
-    job().normals = {0, 4, format};
-    expectGoodOnlyIf(format == VertexFormat::octahedral16x2, ErrorCode::missingFeature,
-                     {"job 1", "normals", "multiples of 4", "4 storage buffers"});
   }
 }
 
@@ -471,6 +551,8 @@ TEST_F(PlanErrors, BoxesOfSnormPositions) {
   const Box good{{-1, 0, 5}, {-0.5f, 1e-6f, 1e6f}};
   for (const VertexFormat format : {VertexFormat::snorm16x4, VertexFormat::snorm16x3}) {
     job().positions = {0, 8, format};
+    job().normals = {};
+    if (format == VertexFormat::snorm16x3) job().normals = {6, 8, VertexFormat::octahedral8x2};
     job().box = good;
     expectGood();
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -23,16 +23,6 @@ std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
   return (value + divisor - 1) / divisor;
 }
 
-/// The most bytes that a store may write, so that nothing else is touched.
-std::uint8_t unitOf(const OutputAttribute& attribute) {
-  for (const std::uint8_t unit : std::initializer_list<std::uint8_t>{4, 2}) {
-    if (attribute.offset % unit == 0 && attribute.stride % unit == 0 &&
-        formatSize(attribute.format) % unit == 0)
-      return unit;
-  }
-  return 1;
-}
-
 bool isMorphed(const Job& job) {
   return !activeMorphs(job.morphs).empty();
 }
@@ -365,13 +355,9 @@ class Simulation {
     const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const bool isWanted = attributes[stream].format != VertexFormat::none;
-      if (variant.units[stream] > 4) {
+      if (variant.wide[stream]) {
         ASSERT_TRUE(variant.texels && isWanted);
-        ASSERT_EQ(variant.units[stream], formatSize(attributes[stream].format));
-        const bool isOfRecord = variant.recordBytes != 0 && stream != previousStream;
-        ASSERT_TRUE(isOfRecord || attributes[stream].offset % variant.units[stream] == 0);
-      } else {
-        ASSERT_EQ(variant.units[stream], isWanted ? unitOf(attributes[stream]) : 4);
+        ASSERT_EQ(attributes[stream].offset % formatSize(attributes[stream].format), 0u);
       }
       if (!isWanted) {
         ASSERT_EQ(dispatch.windows[stream].index, 0u);
@@ -467,7 +453,14 @@ class Simulation {
       ASSERT_EQ(window + place, attribute.offset + std::uint64_t{vertex} * attribute.stride)
           << "job " << index << ", stream " << stream << ", vertex " << vertex;
       ASSERT_LE(place + formatSize(attribute.format), range) << "outside the output range";
-      ASSERT_EQ(place % dispatch.variant.units[stream], 0u);
+      if (dispatch.variant.wide[stream]) {
+        ASSERT_EQ(place % formatSize(attribute.format), 0u);
+      }
+      // The kernel knows from formats where in a word an attribute begins.
+      std::uint32_t before = 0;
+      for (std::size_t other = 0; other < stream && stream != previousStream; ++other)
+        before += formatSize(attributesOf(job)[other].format);
+      ASSERT_EQ(place % 4, before % 4);
       if (job.settles && stream != previousStream) continue;  // positions are read
       std::uint8_t& streams = written_[index].at(vertex);
       ASSERT_EQ(streams & 1u << stream, 0u) << "a vertex is skinned twice";
@@ -656,6 +649,18 @@ VertexFormat anyFormat(std::mt19937& engine, bool (*isAllowed)(VertexFormat)) {
   }
 }
 
+/// Whether kernels can store a job's attributes.
+bool isOfWords(const Job& job, Arrangement arrangement) {
+  std::uint32_t length = 0, bits = 0;
+  for (const OutputAttribute& attribute : attributesOf(job)) {
+    length += formatSize(attribute.format);
+    bits |= formatSize(attribute.format);
+  }
+  const bool isMotionOfWords =
+      job.motion == Motion::none || formatSize(job.positions.format) % 4 == 0;
+  return (arrangement == Arrangement::interleaved ? length : bits) % 4 == 0 && isMotionOfWords;
+}
+
 }  // namespace
 
 OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate) {
@@ -666,22 +671,23 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
   OwnedBatch batch = batchOfFiveMeshes();
   for (std::uint32_t index = 0; index < jobs; ++index) {
     Job job = batch.jobOf(below(5), below(4), allMethods[below(allMethods.size())]);
-    job.positions.format = anyFormat(engine, isPositionFormat);
-    if (job.mesh.hasNormals && below(3) != 0)
-      job.normals.format = anyFormat(engine, isNormalFormat);
-    if (job.mesh.hasTangents && below(3) != 0)
-      job.tangents.format = anyFormat(engine, isTangentFormat);
+    const Arrangement arrangement = separate        ? Arrangement::separate
+                                    : below(2) == 0 ? Arrangement::planar
+                                                    : Arrangement::interleaved;
+    job.motion = static_cast<Motion>(below(2));
+    do {
+      job.positions.format = anyFormat(engine, isPositionFormat);
+      const bool normals = job.mesh.hasNormals && below(3) != 0;
+      job.normals.format = normals ? anyFormat(engine, isNormalFormat) : VertexFormat::none;
+      const bool tangents = job.mesh.hasTangents && below(3) != 0;
+      job.tangents.format = tangents ? anyFormat(engine, isTangentFormat) : VertexFormat::none;
+    } while (!isOfWords(job, arrangement));
     job.box = {{-1, -2, -3}, {4, 5, static_cast<float>(6 + below(9))}};
     job.bounds = below(3) == 0;
-    job.motion = static_cast<Motion>(below(2));
     job.restartsMotion = job.motion != Motion::none && below(4) == 0;
     job.settles = job.motion != Motion::none && below(4) == 0;
     if (below(2) == 0) job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
-    batch.place(job,
-                separate        ? Arrangement::separate
-                : below(2) == 0 ? Arrangement::planar
-                                : Arrangement::interleaved,
-                below(4));
+    batch.place(job, arrangement, below(3) * 4);
   }
   return batch;
 }
@@ -689,7 +695,6 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
 DeviceLimits richLimits() {
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.storage16Bit = limits.storage8Bit = true;
   return limits;
 }
 

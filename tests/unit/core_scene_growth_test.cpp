@@ -210,20 +210,6 @@ TEST_F(SceneGrowthTest, PosesThatTheGpuWritesCanBeBoundAtTheirOffset) {
   }
 }
 
-// Their readers read whole words.
-TEST_F(SceneGrowthTest, OutputsOfHalfWordsHaveRoomForWords) {
-  description.limits.storage16Bit = true;
-  description.outputCapacity = {4};
-  create();
-  MeshInfo odd = meshInfo();
-  odd.vertexCount = 101;
-  instance.mesh = scene->addMesh(odd).value();
-  instance.layout = {.positions = VertexFormat::float16x3, .stride = 6};
-  ASSERT_TRUE(scene->addInstance(instance).ok());
-  EXPECT_EQ(memory.asked.back().role, BufferRole::positions);
-  EXPECT_EQ(memory.asked.back().requirement.size, 608u);
-}
-
 TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
   description.jointCapacity = {256, 600};
   create();

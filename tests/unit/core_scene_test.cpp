@@ -200,6 +200,21 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
   EXPECT_FALSE(empty.pipelineNeeds({}).ok());
 }
 
+TEST(Scene, RunsThatAreNotWholeWordsAreRefused) {
+  OneInstance one(false);
+  for (const auto& [layout, text] :
+       {std::pair{VertexLayout{.positions = VertexFormat::float16x3}, "use float16x4"},
+        {VertexLayout{.stride = 14}, "multiples of 4"}}) {
+    InstanceDescription wrong = one.description;
+    wrong.layout = layout;
+    const Result<InstanceHandle> added = one.scene.addInstance(wrong);
+    const Result<PipelineNeeds> needs = one.scene.pipelineNeeds(wrong);
+    ASSERT_FALSE(added.ok() || needs.ok());
+    for (const Error& error : {added.error(), needs.error()})
+      EXPECT_NE(error.message.find(text), std::string::npos) << error.message;
+  }
+}
+
 TEST(Scene, TheGpuChoosesBeforeItSkins) {
   OneInstance one(true);
   const std::vector<std::string> first{"compute, copy, indirect before compute, copy",

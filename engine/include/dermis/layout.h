@@ -13,15 +13,16 @@ namespace dermis {
 /// Where one attribute of the skinned vertices is written. Vertex v is at `offset + v * stride` in
 /// the output buffer of that attribute. Bytes between attributes are never written.
 ///
-/// Rules on the GPU. On the CPU there is none but the minimum of the stride.
-/// - Offset, stride and the size of the format must be multiples of 4. If
-///   `DeviceLimits::storage16Bit` is true, multiples of 2 are allowed. If `storage8Bit` is true,
-///   too, any number is allowed. If a device has fewer storage buffers than `storageBuffersWanted`,
-///   they must always be multiples of 4.
-/// - If those of normals and tangents that are written directly follow the positions, in this
-/// order,
-///   without gaps and with the same stride, Dermis takes them for one interleaved vertex. They must
-///   then be in one buffer (`OutputSizes::isOneBuffer`). Previous positions do not matter.
+/// Positions, normals and tangents, in this order, form a run if they follow each other without a
+/// gap and have the same stride. An attribute alone is a run, too; previous positions always are.
+///
+/// Rules of batches and scenes. For `cpu::skin` there is none but the minimum of the stride.
+/// - A run begins at a multiple of 4 bytes. Its length and its stride are multiples of 4. For
+///   example, float16x3 and octahedral8x2 are a run of 8 bytes; float32x3 and octahedral8x2 twice
+///   are one of 16. But float16x3 alone needs float16x4 instead.
+/// - All attributes must go to one buffer (`OutputSizes::isOneBuffer`) if positions, normals and
+///   tangents, as far as they are written, are one run of at least two attributes, or if the size
+///   of one of the three is not a multiple of 4 bytes.
 /// - If positions and normals are float32x3, normals directly follow positions, and both have the
 ///   same stride, a multiple of 8: the offset of the positions must be a multiple of 8, and both
 ///   must be in one buffer, wherever tangents are.

@@ -35,8 +35,8 @@ struct DeviceLimits {
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
   /// Maximum storage buffers of one kernel. With fewer than `storageBuffersWanted`, all attributes
-  /// of a job must go to one buffer, at multiples of 4 bytes and as if `separateRanges` were false.
-  /// Bounds and snorm16 positions are then not available.
+  /// of a job must go to one buffer, as if `separateRanges` were false. Bounds and snorm16
+  /// positions are then not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
   /// Whether one dispatch may bind a different window of the output buffer for each attribute. If
   /// false, and the output buffer is larger than a storage buffer range, the attributes of each
@@ -44,18 +44,11 @@ struct DeviceLimits {
   /// range of each other. `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is not
   /// enabled.
   bool separateRanges = true;
-  /// Whether kernels may store 2 bytes at a time
-  /// (VkPhysicalDevice16BitStorageFeatures::storageBuffer16BitAccess). `OutputAttribute` says what
-  /// this permits. Must be false if Dermis was built without `DERMIS_SUBWORD_STORES`;
-  /// `vulkan::Context::limits` then returns false.
-  bool storage16Bit = false;
-  /// The same for 1 byte (VkPhysicalDevice8BitStorageFeatures::storageBuffer8BitAccess).
-  bool storage8Bit = false;
   /// Whether kernels are those for CPU devices. They read tables, meshes and palettes, and in a
   /// batch with `Method::linear` poses, through uniform texel buffers, and store an attribute, or
   /// all of a vertex, at once; both are faster on lavapipe. Requires the features `shaderInt64` and
   /// `scalarBlockLayout`, and that a uniform texel buffer of 4-byte texels can hold a whole storage
-  /// buffer range. Kernels that store less than 4 bytes at a time always read storage buffers.
+  /// buffer range.
   bool texelBuffers = false;
   /// Whether kernels collect interleaved vertices in workgroup memory, so that consecutive
   /// invocations store consecutive blocks of 16 bytes. Needs no device feature. Used only if
@@ -167,8 +160,8 @@ struct OutputSizes {
   std::uint64_t tangents = 0;
   std::uint64_t previousPositions = 0;
   /// Whether all attributes share one buffer. `OutputAttribute` says when they must. If a kernel
-  /// relies on it, `record` checks that positions and normals are in the same buffer at the same
-  /// offset.
+  /// relies on it, `record` checks that positions, normals and tangents are in the same buffer at
+  /// the same offset.
   bool isOneBuffer = false;
 
   /// For one buffer of `size` bytes that all attributes share.
@@ -213,9 +206,9 @@ struct Variant {
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::none;
   VertexFormat tangents = VertexFormat::none;
-  /// Bytes that one store writes to each stream: 1, 2 or 4. With `texels` also 8, 12 or 16, which
-  /// is then the size of the attribute.
-  std::array<std::uint8_t, streamCount> units{4, 4, 4, 4};
+  /// By `Stream`: whether one store writes the whole attribute, of 8, 12 or 16 bytes. Only with
+  /// `texels`.
+  std::array<bool, streamCount> wide{};
   Motion motion = Motion::none;
   bool bounds = false;
   /// Whether instances have active morph targets.
@@ -260,8 +253,8 @@ DERMIS_CORE_API bool hasResults(const Variant& variant);
 /// for jobs whose attributes are all aligned to the size of their stores, and with narrower stores,
 /// for all other jobs.
 ///
-/// Fails with `invalidArgument` if the job's method, motion or formats, the limits or the tuning
-/// are not valid.
+/// Fails with `invalidArgument` if the job's method, motion, formats or runs of attributes, the
+/// limits or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const Job& job,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
@@ -282,7 +275,8 @@ struct PipelineNeeds {
 
 /// All variants for instances with these needs, at any offset that `placeVertices` accepts. With
 /// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does, and with
-/// `invalidArgument` if the method, the limits or the tuning are not valid.
+/// `invalidArgument` if the layout breaks a rule of `OutputAttribute`, or if the method, the limits
+/// or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
@@ -465,8 +459,7 @@ class DERMIS_CORE_API Plan {
 /// - `invalidArgument` if a job or pose breaks a rule above (the message names it by its index),
 ///   for example: a pose with fewer joints than the mesh requires, normals for a mesh without
 ///   normals, a range outside its buffer. Also if limits or tuning are not valid;
-/// - `missingFeature` if an attribute is not at multiples of 4 bytes and the device cannot store
-///   less, or if this build lacks the kernels of the method;
+/// - `missingFeature` if this build lacks the kernels of the method;
 /// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,
 ///   if a dispatch has too many workgroups, if the device has too few storage buffers for a job, or
 ///   if the attributes of a vertex must lie in one `OutputWindow` and do not

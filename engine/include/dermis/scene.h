@@ -316,7 +316,8 @@ class DERMIS_CORE_API Scene {
   /// What `prepare` needs for such an instance with this mesh, pose and method. `everyVariant` then
   /// lists two kernels for most instances, instead of up to nine. Another mesh with the same
   /// minimum and maximum of influences, or another pose with the same `mayScale`, needs nothing
-  /// more. Fails with `invalidArgument` if the method is not valid, and as `placeVertices` does.
+  /// more. Fails with `invalidArgument` if the method is not valid, or if the layout breaks a rule
+  /// of `OutputAttribute`, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);

@@ -32,7 +32,7 @@ enum class VertexFormat : std::uint8_t {
   float16x4,
   snorm16x3,
   snorm16x4,
-  snorm8x3,
+  snorm8x3,  ///< `cpu::skin` only: no run with it is whole words (`OutputAttribute`)
   snorm8x4,
   octahedral16x2,
   octahedral8x2,

@@ -38,8 +38,7 @@ Result<void> checkLayout(const Job& job) {
   batch.outputs = OutputSizes::oneBuffer(~std::uint64_t{0} / 4 * 4);
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.storage16Bit = limits.storage8Bit = true;
-  return checkJob(batch, checked, {"the job"}, limits);
+  return checkJob(batch, checked, outputStreams(checked), {"the job"}, limits);
 }
 
 Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,

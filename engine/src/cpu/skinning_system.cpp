@@ -45,7 +45,6 @@ DeviceLimits limitsOfMemory() {
   limits.minStorageBufferOffsetAlignment = 64;
   limits.maxWorkgroupCountX = limits.maxWorkgroupCountY = 0xffffffff;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.storage16Bit = limits.storage8Bit = true;
   limits.comparisonMethods = false;
   return limits;
 }

@@ -37,23 +37,11 @@ struct CpuDeviceFeatures {
 };
 
 /// Reads the features that Dermis uses from a pNext chain.
-CpuDeviceFeatures readFeatures(const void* chain, DeviceLimits& limits) {
+CpuDeviceFeatures readFeatures(const void* chain) {
   CpuDeviceFeatures features;
   for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
        next = next->pNext) {
     switch (next->sType) {
-      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_16BIT_STORAGE_FEATURES:
-        limits.storage16Bit |= reinterpret_cast<const VkPhysicalDevice16BitStorageFeatures*>(next)
-                                   ->storageBuffer16BitAccess == VK_TRUE;
-        break;
-      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES:
-        limits.storage16Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan11Features*>(next)
-                                   ->storageBuffer16BitAccess == VK_TRUE;
-        break;
-      case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_8BIT_STORAGE_FEATURES:
-        limits.storage8Bit |= reinterpret_cast<const VkPhysicalDevice8BitStorageFeatures*>(next)
-                                  ->storageBuffer8BitAccess == VK_TRUE;
-        break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES:
         features.scalarBlockLayout |=
             reinterpret_cast<const VkPhysicalDeviceScalarBlockLayoutFeatures*>(next)
@@ -63,8 +51,6 @@ CpuDeviceFeatures readFeatures(const void* chain, DeviceLimits& limits) {
         features.scalarBlockLayout |=
             reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)->scalarBlockLayout ==
             VK_TRUE;
-        limits.storage8Bit |= reinterpret_cast<const VkPhysicalDeviceVulkan12Features*>(next)
-                                  ->storageBuffer8BitAccess == VK_TRUE;
         break;
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2:
         features.shaderInt64 |=
@@ -167,11 +153,8 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   state.limits.separateRanges = state.pushesDescriptors();
   state.timestampPeriod = properties.limits.timestampPeriod;
-  const CpuDeviceFeatures features = readFeatures(description.enabledFeatures, state.limits);
-  // Whether this build has the kernels.
+  const CpuDeviceFeatures features = readFeatures(description.enabledFeatures);
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
-  state.limits.storage16Bit &= !kernels::find("skin_halves").empty();
-  state.limits.storage8Bit &= !kernels::find("skin_bytes").empty();
   const DeviceDefaults defaults = defaultsOf(properties.deviceType);
   state.tuning = defaults.tuning;
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);

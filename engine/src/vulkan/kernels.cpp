@@ -1,6 +1,5 @@
 #include "dermis/vulkan/kernels.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <string>
 
@@ -96,8 +95,7 @@ std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
   if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
   if (variant.staged) return name + "_staged";
   if (variant.texels) return name + "_texels";
-  const unsigned smallest = *std::min_element(variant.units.begin(), variant.units.end());
-  return name + (smallest == 4 ? "" : smallest == 2 ? "_halves" : "_bytes");
+  return name;
 }
 
 std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
@@ -118,7 +116,7 @@ SpecializationConstants specializationConstants(const Variant& variant) {
   set(abi::CONSTANT_NORMAL_FORMAT, variant.normals);
   set(abi::CONSTANT_TANGENT_FORMAT, variant.tangents);
   for (std::uint32_t stream = 0; stream < streamCount; ++stream)
-    set(abi::CONSTANT_POSITION_UNIT + stream, variant.units[stream]);
+    constants.values[abi::CONSTANT_WIDE] |= std::uint32_t{variant.wide[stream]} << stream;
   set(abi::CONSTANT_MOTION, variant.motion);
   set(abi::CONSTANT_MORPHS, variant.morphs);
   set(abi::CONSTANT_BOUNDS, variant.bounds);

@@ -15,12 +15,6 @@ namespace {
 
 /// Checks that a device with these features can use the module for a variant.
 Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
-  for (const std::uint8_t unit : variant.units) {
-    if (unit >= 4 || (limits.storage16Bit && (unit == 2 || limits.storage8Bit))) continue;
-    return Error{ErrorCode::missingFeature,
-                 "a variant that stores less than 4 bytes at a time needs storageBuffer16BitAccess "
-                 "and, for single bytes, storageBuffer8BitAccess"};
-  }
   if (variant.texels && !limits.texelBuffers) {
     return Error{ErrorCode::missingFeature,
                  "a variant that reads texel buffers needs scalarBlockLayout and shaderInt64"};

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "dermis/vulkan/scope.h"
+#include "plan/placement.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
 
@@ -82,18 +83,27 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   return {};
 }
 
-/// Variants that store attributes together write through the binding of the positions.
+/// Variants that store attributes together write them through the binding of one of them.
 Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
-  const bool stores =
-      std::any_of(plan.variants().begin(), plan.variants().end(),
-                  [](const Variant& variant) { return variant.pairs || variant.recordBytes != 0; });
   const BufferRange& positions = buffers.outputs.positions;
-  const BufferRange& normals = buffers.outputs.normals;
-  if (!stores || (positions.buffer == normals.buffer && positions.offset == normals.offset))
-    return {};
-  return Error{
-      ErrorCode::invalidArgument,
-      "the plan was made for outputs in one buffer, but the bindings have normals in another"};
+  for (const Variant& variant : plan.variants()) {
+    if (variant.kernel != Kernel::skin ||
+        !(variant.pairs || variant.recordBytes != 0 ||
+          shareWords(variant.positions, variant.normals, variant.tangents)))
+      continue;
+    for (const auto& [format, range, name] :
+         {std::tuple{variant.normals, &buffers.outputs.normals, "normals"},
+          {variant.tangents, &buffers.outputs.tangents, "tangents"}}) {
+      if (format == VertexFormat::none ||
+          (range->buffer == positions.buffer && range->offset == positions.offset))
+        continue;
+      return Error{ErrorCode::invalidArgument,
+                   std::string("the plan was made for outputs in one buffer, but the bindings have "
+                               "positions and ") +
+                       name + " in two"};
+    }
+  }
+  return {};
 }
 
 Result<void> BindingsState::checkVariants(const Plan& plan) const {

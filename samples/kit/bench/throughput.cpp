@@ -317,7 +317,7 @@ class Rows : public Throughput {
       for (SkinRequest& request : requests) request.box = box;
       Result<void> added = batches_->add(requests, one.layout, open.context.tuning());
       step();
-      // The device cannot store bytes, or this build lacks some methods.
+      // This build lacks some methods.
       if (!added && added.error().code == ErrorCode::missingFeature) continue;
       if (!added) return added;
       const std::size_t number = batchCount_++;

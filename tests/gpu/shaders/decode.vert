@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Positions in snorm16x4, normals in octahedral16x2 and tangents in octahedral8x2, as the vertex input reads them.
+// Positions in snorm16x4, normals and tangents in octahedral8x2, as the vertex input reads them.
 layout(location = 0) in vec4 position;
 layout(location = 1) in vec2 normal;
 layout(location = 2) in vec2 tangent;

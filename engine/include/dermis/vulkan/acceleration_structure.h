@@ -66,8 +66,8 @@ DERMIS_VULKAN_API VkFormat buildInputFormat(VertexFormat positions);
 /// - if the stride is smaller than a position;
 /// - if the stride, or address + offset, is not a multiple of the size of a component, which is 4
 ///   bytes for float32 and 2 for the others (VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03711,
-///   VUID-VkAccelerationStructureGeometryTrianglesDataKHR-vertexStride-03735). This cannot happen
-///   unless the device stores less than 4 bytes at a time (`OutputAttribute`).
+///   VUID-VkAccelerationStructureGeometryTrianglesDataKHR-vertexStride-03735). For an instance of a
+///   batch or a scene, only the address can be wrong.
 DERMIS_VULKAN_API Result<VkAccelerationStructureGeometryTrianglesDataKHR> buildInput(
     const OutputAttribute& positions, std::uint32_t vertexCount, VkDeviceAddress outputAddress);
 

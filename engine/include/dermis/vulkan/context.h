@@ -34,10 +34,6 @@ struct DeviceDescription {
   /// The enabled features: the pNext chain of VkDeviceCreateInfo. If the engine used
   /// `pEnabledFeatures`, it passes a VkPhysicalDeviceFeatures2 with the same contents. Dermis uses
   /// these features if they are enabled:
-  /// - storageBuffer16BitAccess of VkPhysicalDevice16BitStorageFeatures or
-  ///   VkPhysicalDeviceVulkan11Features;
-  /// - storageBuffer8BitAccess of VkPhysicalDevice8BitStorageFeatures or
-  ///   VkPhysicalDeviceVulkan12Features;
   /// - scalarBlockLayout of VkPhysicalDeviceScalarBlockLayoutFeatures or
   ///   VkPhysicalDeviceVulkan12Features;
   /// - shaderInt64 of VkPhysicalDeviceFeatures2.

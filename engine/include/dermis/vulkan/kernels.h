@@ -38,10 +38,9 @@ namespace dermis::vulkan {
 DERMIS_VULKAN_API std::string kernelName(const Variant& variant, const DeviceLimits& limits);
 
 /// The module for a variant, on a device with these limits: SPIR-V 1.3, entry point "main". The
-/// memory is static, and variants of the same module get the same span. A module with stores of 2
-/// bytes requires `DeviceLimits::storage16Bit`, one with stores of 1 byte `storage8Bit`, too. With
-/// `Variant::texels` it requires the features `shaderInt64` and `scalarBlockLayout`. Empty if this
-/// build of Dermis does not contain the module.
+/// memory is static, and variants of the same module get the same span. With `Variant::texels` it
+/// requires the features `shaderInt64` and `scalarBlockLayout`. Empty if this build of Dermis does
+/// not contain the module.
 DERMIS_VULKAN_API std::span<const std::uint32_t> kernelSpirv(const Variant& variant,
                                                              const DeviceLimits& limits);
 

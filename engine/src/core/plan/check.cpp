@@ -22,50 +22,16 @@ Error wrongFormat(VertexFormat format, const char* name, const Subject& subject)
                  std::string(formatName(format)));
 }
 
-std::string placeOf(const OutputStreams& streams, std::size_t index, const Subject& subject) {
-  const OutputStream& stream = streams[index];
-  return subject.name() + ": the offset " + std::to_string(stream.offset) + ", stride " +
-         std::to_string(stream.stride) + " and size " + std::to_string(stream.size) + " of its " +
-         streamName(index);
-}
-
-/// Whether kernels may store 1 or 2 bytes.
-Result<void> checkSmallUnit(const OutputStreams& streams, std::size_t index, const Subject& subject,
-                            const DeviceLimits& limits) {
-  const std::uint8_t unit = storeUnit(streams[index]);
-  if (limits.maxStorageBuffersPerStage < storageBuffersWanted) {
-    return Error{ErrorCode::missingFeature, placeOf(streams, index, subject) +
-                                                " must be multiples of 4 on a device with " +
-                                                std::to_string(limits.maxStorageBuffersPerStage) +
-                                                " storage buffers per stage"};
-  }
-  if (unit == 2 && !limits.storage16Bit) {
-    return Error{ErrorCode::missingFeature,
-                 placeOf(streams, index, subject) +
-                     " must be multiples of 4, unless storageBuffer16BitAccess is enabled and "
-                     "Dermis was built with DERMIS_SUBWORD_STORES"};
-  }
-  if (unit == 1 && !(limits.storage16Bit && limits.storage8Bit)) {
-    return Error{
-        ErrorCode::missingFeature,
-        placeOf(streams, index, subject) +
-            " must be multiples of 4, unless storageBuffer8BitAccess and "
-            "storageBuffer16BitAccess are enabled and Dermis was built with DERMIS_SUBWORD_STORES"};
-  }
-  return {};
-}
-
 Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStreams& streams,
-                          const Subject& subject, const DeviceLimits& limits) {
+                          const Subject& subject) {
   const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
   for (std::size_t index = 0; index < streamCount; ++index) {
     const OutputStream& stream = streams[index];
     if (stream.size == 0) continue;
     if (stream.stride < stream.size) {
-      return invalid(placeOf(streams, index, subject) + ": the stride must be at least the size");
-    }
-    if (storeUnit(stream) != 4) {
-      if (Result<void> good = checkSmallUnit(streams, index, subject, limits); !good) return good;
+      return invalid(subject.name() + ": the stride " + std::to_string(stream.stride) + " of its " +
+                     streamName(index) + " must be at least their size " +
+                     std::to_string(stream.size));
     }
     const std::uint64_t length =
         std::uint64_t{job.mesh.vertexCount - 1} * stream.stride + stream.size;
@@ -84,7 +50,9 @@ Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStrea
     return subject.name() + ": its attributes are adjacent, with a stride of " +
            std::to_string(job.positions.stride);
   };
-  if (!batch.outputs.isOneBuffer && (standsTogether(streams) || standsInPairs(job)))
+  if (!batch.outputs.isOneBuffer &&
+      (standsTogether(streams) || standsInPairs(job) ||
+       shareWords(job.positions.format, job.normals.format, job.tangents.format)))
     return invalid(name() + ": all attributes must go to one buffer (OutputSizes::isOneBuffer)");
   if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
     return invalid(name() + ": positions must begin at a multiple of 8, not at " +
@@ -233,18 +201,87 @@ Result<void> checkVariant(const Variant& variant) {
   const auto isOneOf = [](std::uint32_t value, std::initializer_list<std::uint32_t> values) {
     return std::ranges::find(values, value) != values.end();
   };
-  const bool hasUnits = std::ranges::all_of(variant.units, [&](std::uint8_t unit) {
-    return isOneOf(unit, {1, 2, 4, 8, 12, 16});
-  });
-  if (!hasUnits || !isOneOf(variant.recordBytes, {0, 8, 12, 16, 24, 32}) ||
+  if (!isOneOf(variant.recordBytes, {0, 8, 12, 16, 24, 32}) ||
       !isOneOf(variant.influences, {0, 1, 2, 4}))
-    return invalid("the variant's units, recordBytes or influences are none that a plan uses");
+    return invalid("the variant's recordBytes or influences are none that a plan uses");
   return checkTuning({variant.workgroupSize, variant.instancesPerInvocation});
 }
 
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
   if (Result<void> good = checkMethod(needs.method, {"the instance"}); !good) return good.error();
-  return placeVertices(needs.layout, 1);
+  const Result<VertexPlaces> places = placeVertices(needs.layout, 1);
+  if (!places) return places;
+  Job job;
+  job.place(*places);
+  if (Result<void> good = checkRuns(job, outputStreams(job), {"the layout"}); !good)
+    return good.error();
+  return places;
+}
+
+namespace {
+
+/// A format with the same values, of whole words.
+VertexFormat formatOfWords(VertexFormat format) {
+  switch (format) {
+    case VertexFormat::float16x3:
+      return VertexFormat::float16x4;
+    case VertexFormat::snorm16x3:
+      return VertexFormat::snorm16x4;
+    case VertexFormat::snorm8x3:
+      return VertexFormat::snorm8x4;
+    case VertexFormat::octahedral8x2:
+      return VertexFormat::octahedral16x2;
+    default:
+      return format;
+  }
+}
+
+/// Attributes of a vertex that follow each other.
+struct AttributeRun {
+  std::size_t first = 0;     ///< by `Stream`
+  std::size_t part = 0;      ///< the last one that is not whole words
+  std::uint32_t length = 0;  ///< bytes
+};
+
+bool isOfWords(const OutputStreams& streams, const AttributeRun& run) {
+  const OutputStream& first = streams[run.first];
+  return (first.offset | first.stride | run.length) % 4 == 0;
+}
+
+Error wrongRun(const Job& job, const AttributeRun& run, const OutputStream& first,
+               const Subject& subject) {
+  if (run.length % 4 == 0) {
+    return invalid(subject.name() + ": offset " + std::to_string(first.offset) + " and stride " +
+                   std::to_string(first.stride) + " of its " + streamName(run.first) +
+                   " must be multiples of 4");
+  }
+  const std::array formats{job.positions.format, job.normals.format, job.tangents.format,
+                           job.positions.format};
+  return invalid(subject.name() + ": its " + streamName(run.part) + " as " +
+                 std::string(formatName(formats[run.part])) + " are in a run of " +
+                 std::to_string(run.length) + " bytes, which is not a multiple of 4; use " +
+                 std::string(formatName(formatOfWords(formats[run.part]))));
+}
+
+}  // namespace
+
+Result<void> checkRuns(const Job& job, const OutputStreams& streams, const Subject& subject) {
+  AttributeRun run;
+  std::uint64_t end = streams[0].offset;
+  for (std::size_t index = 0; index < streamCount; ++index) {
+    const OutputStream& stream = streams[index];
+    if (stream.size == 0) continue;
+    const bool follows = stream.offset == end && stream.stride == streams[run.first].stride;
+    if (!follows || index == static_cast<std::size_t>(Stream::previousPositions)) {
+      if (!isOfWords(streams, run)) return wrongRun(job, run, streams[run.first], subject);
+      run = {index, index, 0};
+    }
+    if (stream.size % 4 != 0) run.part = index;
+    run.length += stream.size;
+    end = stream.offset + stream.size;
+  }
+  if (!isOfWords(streams, run)) return wrongRun(job, run, streams[run.first], subject);
+  return {};
 }
 
 Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
@@ -295,7 +332,7 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
                      " storage buffers per stage does not support"};
   }
   if (Result<void> good = checkTogether(batch, job, streams, subject); !good) return good;
-  return checkStreams(batch, job, streams, subject, limits);
+  return checkStreams(batch, job, streams, subject);
 }
 
 Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,

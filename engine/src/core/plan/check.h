@@ -43,21 +43,19 @@ Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFo
                           const Subject& subject);
 /// Whether all members have values that plans use. `Variant::key` is then unique.
 DERMIS_CORE_API Result<void> checkVariant(const Variant& variant);
-/// Where one vertex is placed with this layout. Fails unless all members are valid.
+/// Where one vertex is placed with this layout. Fails unless kernels can store it.
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs);
 
 /// Whether a packed mesh can have these sizes.
 Result<void> checkMeshInfo(const MeshInfo& mesh, const Subject& subject);
 Result<void> checkTuning(const Tuning& tuning);
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index);
-/// `streams`: those of the job.
+/// `streams`: those of the job. Does not check its runs.
 DERMIS_CORE_API Result<void> checkJob(const Batch& batch, const Job& job,
                                       const OutputStreams& streams, const Subject& subject,
                                       const DeviceLimits& limits);
-inline Result<void> checkJob(const Batch& batch, const Job& job, const Subject& subject,
-                             const DeviceLimits& limits) {
-  return checkJob(batch, job, outputStreams(job), subject, limits);
-}
+/// Whether kernels, which store whole words, can store the attributes (`OutputAttribute`).
+Result<void> checkRuns(const Job& job, const OutputStreams& streams, const Subject& subject);
 /// Whether positions in snorm16 can be relative to it.
 DERMIS_CORE_API bool isBox(const Box& box);
 /// snorm16 positions are (p − center) × inverse, with inverse = 1 / half the size.

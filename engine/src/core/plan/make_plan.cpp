@@ -95,6 +95,7 @@ Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits
     placing.subject.index = index;
     if (Result<void> good = checkJob(batch, job, streams, placing.subject, limits); !good)
       return good;
+    if (Result<void> good = checkRuns(job, streams, placing.subject); !good) return good;
     results_[index] = hasResult(job) ? resultCount_++ : notUsed;
     vertexCount_ += job.mesh.vertexCount;
     markPalettes(job);

@@ -34,9 +34,6 @@ Variant outputVariant(const Job& job) {
   variant.tangents = job.tangents.format;
   variant.motion = job.motion;
   variant.bounds = job.bounds;
-  const OutputStreams streams = outputStreams(job);
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    variant.units[stream] = streams[stream].size != 0 ? storeUnit(streams[stream]) : 4;
   return variant;
 }
 
@@ -77,14 +74,10 @@ std::uint32_t recordSize(const Job& job) {
          formatSize(job.tangents.format);
 }
 
-/// Whether one store can write a whole vertex: whole words, or 6 bytes and 2 bytes first.
+/// Whether one store can write a whole vertex.
 bool isRecord(const Job& job) {
-  const std::uint32_t bytes = recordSize(job), positions = formatSize(job.positions.format),
-                      normals = formatSize(job.normals.format);
-  const bool isOfWords =
-      (positions % 4 == 0 && normals % 4 == 0) || (positions == 6 && normals == 2);
-  return isOfWords && formatSize(job.tangents.format) % 4 == 0 &&
-         (bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32);
+  const std::uint32_t bytes = recordSize(job);
+  return bytes == 8 || bytes == 12 || bytes == 16 || bytes == 24 || bytes == 32;
 }
 
 /// Bytes from the beginning of a vertex to an attribute that stands in it; 0 for others.
@@ -93,34 +86,22 @@ std::uint64_t placeInVertex(const OutputStreams& streams, std::size_t stream) {
   return place < streams[0].stride ? place : 0;
 }
 
-/// Bytes that one store writes if kernels may store up to 16 and vertices begin at multiples of
-/// that.
-std::uint8_t wideUnit(const OutputStreams& streams, std::size_t index) {
+/// Whether one store can write a whole attribute if vertices begin at multiples of its size.
+bool isWide(const OutputStreams& streams, std::size_t index) {
   const OutputStream& stream = streams[index];
   const bool isVector = stream.size == 8 || stream.size == 12 || stream.size == 16;
-  const bool fits = isVector && stream.stride % stream.size == 0 &&
-                    placeInVertex(streams, index) % stream.size == 0;
-  return fits ? static_cast<std::uint8_t>(stream.size) : 4;
+  return isVector && stream.stride % stream.size == 0 &&
+         placeInVertex(streams, index) % stream.size == 0;
 }
 
-bool storesWholeWords(const Variant& variant) {
-  return std::ranges::all_of(variant.units, [](std::uint8_t unit) { return unit >= 4; });
-}
-
-/// The widest stores that strides and formats permit. If a whole vertex is stored at once,
-/// attributes may be smaller than a word. Unchanged if another attribute needs smaller stores.
-Variant withWideStores(const Job& job, const Variant& variant) {
-  Variant wide = variant;
+/// Chooses the widest stores that strides and formats permit.
+void widenStores(const Job& job, Variant& variant) {
   const OutputStreams streams = outputStreams(job);
   const std::uint32_t size = recordSize(job);
   if (isRecord(job) && standsTogether(streams) && job.positions.stride % size == 0)
-    wide.recordBytes = static_cast<std::uint8_t>(size);
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const bool isOfRecord = wide.recordBytes != 0 && stream + 1 < streamCount;
-    const bool isWhole = isOfRecord || wide.units[stream] == 4;
-    if (streams[stream].size != 0 && isWhole) wide.units[stream] = wideUnit(streams, stream);
-  }
-  return storesWholeWords(wide) ? wide : variant;
+    variant.recordBytes = static_cast<std::uint8_t>(size);
+  for (std::size_t stream = 0; stream < streamCount; ++stream)
+    variant.wide[stream] = isWide(streams, stream);
 }
 
 /// Whether vertices can go through workgroup memory (`DeviceLimits::stagedStores`).
@@ -137,8 +118,7 @@ bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimit
 bool isAligned(const OutputStreams& streams, const Variant& variant) {
   if (variant.staged) return true;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (variant.units[stream] > 4 && streams[stream].offset % variant.units[stream] != 0)
-      return false;
+    if (variant.wide[stream] && streams[stream].offset % streams[stream].size != 0) return false;
   }
   return variant.recordBytes == 0 || streams[0].offset % variant.recordBytes == 0;
 }
@@ -153,13 +133,12 @@ Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& 
   if (canBeStaged(job, outputStreams(job), limits)) {
     variant.staged = true;
     variant.recordBytes = static_cast<std::uint8_t>(recordSize(job));
-    variant.units.fill(4);
     return variant;
   }
   if (!storesWidely(limits)) return variant;
-  if (areAligned) variant = withWideStores(job, variant);
-  variant.texels = storesWholeWords(variant);
-  variant.pairs = variant.texels && variant.recordBytes == 0 && standsInPairs(job);
+  variant.texels = true;
+  if (areAligned) widenStores(job, variant);
+  variant.pairs = variant.recordBytes == 0 && standsInPairs(job);
   return variant;
 }
 
@@ -266,7 +245,7 @@ std::uint64_t Variant::key() const {
   add(positions, 4);
   add(normals, 4);
   add(tangents, 4);
-  for (const std::uint8_t unit : units) add(unit / 2, 4);
+  for (const bool isWide : wide) add(isWide, 1);
   add(motion, 2);
   add(morphs, 1);
   add(bounds, 1);
@@ -331,6 +310,8 @@ Result<std::vector<Variant>> everyVariant(const Job& job, const DeviceLimits& li
   if (Result<void> good = checkLimits(limits); !good) return good.error();
   if (Result<void> good = checkTuning(tuning); !good) return good.error();
   if (Result<void> good = checkVariant(outputVariant(job)); !good) return good.error();
+  if (Result<void> good = checkRuns(job, outputStreams(job), {"the job"}); !good)
+    return good.error();
   const FormRanges ranges;
   std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
   for (const bool areAligned : {false, true})

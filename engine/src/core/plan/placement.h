@@ -44,12 +44,6 @@ inline std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& siz
 
 const char* streamName(std::size_t stream);
 
-/// Bytes that one store may write, if the device supports it: 4, 2 or 1.
-inline std::uint8_t storeUnit(const OutputStream& stream) {
-  const std::uint64_t bits = stream.offset | stream.stride | stream.size;
-  return bits % 4 == 0 ? 4 : bits % 2 == 0 ? 2 : 1;
-}
-
 /// Whether the kernel writes an `InstanceResult`: bounds, or the number of clamped vertices.
 inline bool hasResult(const Job& job) {
   return job.bounds || isSnormPosition(job.positions.format);
@@ -119,6 +113,12 @@ inline bool standsInPairs(const Job& job) {
          job.normals.format == VertexFormat::float32x3 &&
          job.normals.offset == job.positions.offset + 12 &&
          job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
+}
+
+/// Whether attributes of these formats are joined before they are stored, since some are not whole
+/// words.
+constexpr bool shareWords(VertexFormat positions, VertexFormat normals, VertexFormat tangents) {
+  return (formatSize(positions) | formatSize(normals) | formatSize(tangents)) % 4 != 0;
 }
 
 /// Whether a job has normals or tangents, and they directly follow the positions of each vertex. A

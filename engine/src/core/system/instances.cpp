@@ -66,7 +66,11 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   batch.poses = {&own, 1};
   batch.meshesSize = meshStore_.ranges.capacity();
   batch.outputs = OutputSizes::oneBuffer(std::max(outputStore_.ranges.capacity(), laidOut->size));
-  return checkJob(batch, jobOf(instance, *mesh, *laidOut), theInstance, description_.limits);
+  const Job job = jobOf(instance, *mesh, *laidOut);
+  const OutputStreams streams = outputStreams(job);
+  if (Result<void> good = checkJob(batch, job, streams, theInstance, description_.limits); !good)
+    return good;
+  return checkRuns(job, streams, theInstance);
 }
 
 Result<void> SceneBooks::takeResult(SceneInstance& instance) {

@@ -78,7 +78,6 @@ Result<std::optional<Range>> SceneBooks::take(Store& store, std::uint64_t size,
   // Whole units that the buffer's readers read at once.
   std::uint64_t least = store.ranges.capacityFor(size, alignment);
   if (store.role == BufferRole::meshes) least = (least + 15) / 16 * 16;
-  if (store.role == BufferRole::positions) least = (least + 3) / 4 * 4;
   if (least > store.capacity.maximum) return std::optional<Range>();
   if (Result<void> grown = grow(store, least); !grown) return grown.error();
   return store.ranges.allocate(size, alignment);

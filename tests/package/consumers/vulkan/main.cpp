@@ -51,34 +51,31 @@ bool hasKernels() {
   return !variants.empty();
 }
 
-/// Whether kernels that an option leaves out are there where it does not, and only there.
+/// Whether the kernels for comparison are there where no option leaves them out, and only there.
 bool hasChosenKernels() {
 #ifdef HAS_EVERYDAY_KERNELS_ONLY
   constexpr bool isLeftOut = true;
 #else
   constexpr bool isLeftOut = false;
 #endif
-  Variant comparison, halves;
+  Variant comparison;
   comparison.method = Method::logMatrix;
-  halves.units[0] = 2;
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  limits.storage16Bit = true;
-  return vulkan::kernelSpirv(comparison, limits).empty() == isLeftOut &&
-         vulkan::kernelSpirv(halves, limits).empty() == isLeftOut;
+  return vulkan::kernelSpirv(comparison, limits).empty() == isLeftOut;
 }
 
-/// A hash (FNV-1a) of the kernels for every method, with stores of 4, 2 and 1 bytes.
+/// A hash (FNV-1a) of the kernels for every method, for GPUs and for CPU devices.
 std::uint64_t hashOfKernels() {
   std::uint64_t hash = 0xcbf29ce484222325u;
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
   for (std::uint32_t method = 0; method < 9; ++method) {
-    for (const std::uint32_t unit : {4u, 2u, 1u}) {
+    for (const bool texels : {false, true}) {
       Variant variant;
       variant.kernel = Kernel::skin;
       variant.method = static_cast<Method>(method);
-      variant.units[0] = static_cast<std::uint8_t>(unit);
+      variant.texels = texels;
       for (const std::uint32_t word : vulkan::kernelSpirv(variant, limits))
         hash = (hash ^ word) * 0x100000001b3u;
     }
