@@ -469,6 +469,45 @@ TEST_F(CpuSkinTest, BytesBetweenAndBehindAttributesStay) {
   EXPECT_EQ(odd.back(), untouched);
 }
 
+// The CPU path has no rule for runs of attributes.
+TEST_F(CpuSkinTest, AnyFormatMayBeAtAnyByte) {
+  using enum VertexFormat;
+  constexpr std::uint32_t vertexCount = 203, stride = 41;
+  for (const auto& [positions, normals, tangents] : {std::array{float16x3, snorm8x3, octahedral8x2},
+                                                     {snorm16x3, float16x3, snorm8x4},
+                                                     {float32x3, octahedral8x2, octahedral16x2}}) {
+    Crowd crowd(vertexCount, 4, Rigidity::rigid,
+                layoutOf(positions, normals, tangents, Motion::none, Arrangement::planar));
+    crowd.skin(Method::dualQuaternion);
+    std::vector<std::byte> odd(vertexCount * stride, untouched);
+    cpu::Instance instance = crowd.instances[0];
+    instance.output = odd.data();
+    cpu::Job job = crowd.job(Method::dualQuaternion);
+    job.instances = {&instance, 1};
+    std::uint32_t end = 1;
+    for (OutputAttribute* attribute :
+         {&job.places.positions, &job.places.normals, &job.places.tangents}) {
+      attribute->offset = end;
+      attribute->stride = stride;
+      end += formatSize(attribute->format);
+    }
+    ASSERT_TRUE(cpu::skin(job).ok());
+    for (std::size_t vertex = 0; vertex < vertexCount; ++vertex) {
+      const std::span<std::byte> bytes = std::span(odd).subspan(vertex * stride, stride);
+      for (const auto& [here, there] : {std::pair{&job.places.positions, &crowd.places.positions},
+                                        {&job.places.normals, &crowd.places.normals},
+                                        {&job.places.tangents, &crowd.places.tangents}}) {
+        const std::size_t size = formatSize(here->format);
+        EXPECT_EQ(std::memcmp(bytes.data() + here->offset,
+                              crowd.output.data() + there->offset + vertex * size, size),
+                  0)
+            << vertex;
+      }
+      EXPECT_TRUE(isUntouched(bytes.first(1)) && isUntouched(bytes.subspan(end))) << vertex;
+    }
+  }
+}
+
 // An array for each attribute, as programs without a GPU like it.
 TEST_F(CpuSkinTest, AttributesMayGoToArraysOfTheirOwn) {
   const VertexLayout layout = layoutOf(VertexFormat::float32x3, VertexFormat::float32x3,
