@@ -22,6 +22,7 @@
 #include "dermis/vulkan/vulkan.h"
 
 using namespace dermis;
+using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 4, lostFrame = 3;
 
@@ -153,12 +154,6 @@ void destroyForDermis(void* user, const vulkan::CreatedBuffer& created) {
 }
 // [/callbacks]
 
-void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
-  vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
-                       &memory, 0, nullptr, 0, nullptr);
-}
-
 // -- The character: a strip of two joints.
 
 struct Strip {
@@ -240,10 +235,10 @@ int main() {
       auto beginInfo =
           structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
       must(vkBeginCommandBuffer(engine.commandBuffer, &beginInfo));
-      barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+      context.recordBarrier(engine.commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
       must(scene.record(engine.commandBuffer));
-      barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput) |
-                                        vulkan::outputScope(vulkan::Consumer::hostRead));
+      context.recordBarrier(engine.commandBuffer,
+                            barrierBetween(Use::dermis, Use::vertexInput | Use::hostRead));
       must(vkEndCommandBuffer(engine.commandBuffer));
       // [lost-frame]
       if (frame == lostFrame) {

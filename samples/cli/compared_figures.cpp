@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "kit/device.h"
 
 namespace dermis::cli {
@@ -79,12 +79,12 @@ Result<void> ComparedFigures::readBack() {
   const Result<void> copied = device_->device->run([&](VkCommandBuffer commandBuffer) {
     if (copies.empty()) return Result<void>();
     const samples::Device& device = *device_->device;
-    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+    device_->context.recordBarrier(
+        commandBuffer, vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyRead));
     device.functions().CmdCopyBuffer(commandBuffer, output, buffer->handle(),
                                      static_cast<std::uint32_t>(copies.size()), copies.data());
-    recordBarrier(device, commandBuffer,
-                  {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+    device_->context.recordBarrier(
+        commandBuffer, vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::hostRead));
     return Result<void>();
   });
   if (!copied) return copied;

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "kit/device.h"
 #include "kit/render/draw.h"
 #include "scene_skinner.h"
@@ -238,13 +238,13 @@ Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const Morph
 }
 
 Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
-  recordBarrier(*device_->device, commandBuffer,
-                vulkan::inputScope(vulkan::PreviousUse::vertexInput) |
-                    vulkan::inputScope(vulkan::PreviousUse::transfer));
+  device_->context.recordBarrier(
+      commandBuffer, vulkan::barrierBetween(vulkan::Use::vertexInput | vulkan::Use::copyRead,
+                                            vulkan::Use::dermis));
   if (Result<void> done = system_->record(commandBuffer); !done) return done;
-  recordBarrier(*device_->device, commandBuffer,
-                vulkan::outputScope(vulkan::Consumer::vertexInput) |
-                    vulkan::outputScope(vulkan::Consumer::transfer));
+  device_->context.recordBarrier(
+      commandBuffer, vulkan::barrierBetween(vulkan::Use::dermis,
+                                            vulkan::Use::vertexInput | vulkan::Use::copyRead));
   return {};
 }
 

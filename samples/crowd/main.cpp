@@ -48,6 +48,7 @@ namespace {
 
 using namespace dermis;
 using namespace dermis::samples;
+using vulkan::Use;
 using Json = nlohmann::ordered_json;
 
 struct Options {
@@ -300,17 +301,18 @@ VkBuffer writeVisibility(Crowd<vulkan::SkinningSystem>& crowd, Device& device,
 /// Call it in each frame, outside a render pass. `completedFrame` is the newest frame that the GPU
 /// has completed. `visibility` is a buffer that no frame in flight uses.
 void skinFrame(Crowd<vulkan::SkinningSystem>& crowd, std::uint64_t frame,
-               std::uint64_t completedFrame, Device& device, VkCommandBuffer commandBuffer,
+               std::uint64_t completedFrame, OpenDevice& open, VkCommandBuffer commandBuffer,
                MappedBuffer& visibility, const Options& options) {
   must(crowd.system().beginFrame(frame, completedFrame));
   crowd.update(frame);
   vulkan::FrameDescription description;
-  if (options.culledOnGpu) description.visibility = writeVisibility(crowd, device, visibility);
+  if (options.culledOnGpu)
+    description.visibility = writeVisibility(crowd, *open.device, visibility);
 
-  // The check copies the vertices. To draw them, use vertexInput in both barriers.
-  recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
+  // The check copies the vertices. To draw them, use `Use::vertexInput` in both barriers.
+  open.context.recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
   must(crowd.system().record(commandBuffer, description));
-  recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+  open.context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
 }
 // [/crowd-frame]
 
@@ -485,9 +487,7 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
   const VkBufferCopy region{0, 0, size};
   device.functions().CmdCopyBuffer(commandBuffer, system.outputBuffer(), readBack.buffer.handle(),
                                    1, &region);
-  recordBarrier(device, commandBuffer,
-                {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                 {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+  recordBarrier(device, commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
 }
 
 ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Options& options) {
@@ -509,7 +509,7 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
     const VkCommandBuffer commandBuffer = must(loop.begin());
     const std::size_t slot = frame % inFlight;
     if (frame > inFlight && options.checks(loop.completed())) compare(loop.completed());
-    skinFrame(crowd, frame, loop.completed(), device, commandBuffer, visibility[slot], options);
+    skinFrame(crowd, frame, loop.completed(), open, commandBuffer, visibility[slot], options);
     const vulkan::SystemStatistics statistics = crowd.system().statistics();
     report.add(crowd.figures(), statistics.lastFrame, statistics.lastCompletedFrame);
     follow(check, crowd, frame, options.culledOnGpu);

@@ -25,6 +25,7 @@
 #include "dermis/vulkan/vulkan.h"
 
 using namespace dermis;
+using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, jointCount = 2, instanceCount = 100, frameCount = 4;
 
@@ -128,12 +129,6 @@ void submit(const Engine& engine) {
   info.pCommandBuffers = &engine.commandBuffer;
   must(vkQueueSubmit(engine.queue, 1, &info, VK_NULL_HANDLE));
   must(vkQueueWaitIdle(engine.queue));
-}
-
-void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
-  vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
-                       &memory, 0, nullptr, 0, nullptr);
 }
 
 // -- The mesh: a strip of two joints. Each instance has its own pose.
@@ -257,10 +252,10 @@ int main() {
     std::ranges::copy(std::as_bytes(std::span(matrices)), poses.bytes().begin());
     must(writeTables(plan, tables.bytes()));
     // The engine records the barriers around `record`: only it knows how else it uses the buffers.
-    barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::dermis));
     must(context.record(engine.commandBuffer, plan, bindings));
-    // This program reads the vertices on the CPU. To draw them, use Consumer::vertexInput.
-    barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+    // This program reads the vertices on the CPU. To draw them, use `Use::vertexInput`.
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::hostRead));
     // [/frame]
     must(vkEndCommandBuffer(engine.commandBuffer));
     submit(engine);

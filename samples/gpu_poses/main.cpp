@@ -23,6 +23,7 @@
 #include "dermis_gpu_poses_shaders.h"  // wave.comp as SPIR-V
 
 using namespace dermis;
+using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 40, jointCount = 2, figureCount = 10'000, frameCount = 3;
 
@@ -199,12 +200,6 @@ struct Animation {
   }
 };
 
-void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
-  vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
-                       &memory, 0, nullptr, 0, nullptr);
-}
-
 // -- The figures: strips of two joints.
 
 struct Strip {
@@ -278,13 +273,13 @@ int main() {
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
     // [frame]
     // The previous frame may still read the poses.
-    barrier(engine.commandBuffer, vulkan::overwriteScope(vulkan::Writer::compute));
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::computeWrite));
     animation.record(engine.commandBuffer, static_cast<float>(frame));
     must(scene.markAllWritten());
-    barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::computeWrite) |
-                                      vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+    context.recordBarrier(engine.commandBuffer,
+                          barrierBetween(Use::computeWrite | Use::vertexInput, Use::dermis));
     must(scene.record(engine.commandBuffer));
-    barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
     // [/frame]
     // An engine draws here.
     must(vkEndCommandBuffer(engine.commandBuffer));
@@ -299,12 +294,11 @@ int main() {
   const Buffer matrices = makeBuffer(engine, needed.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, mapped);
   auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
-  barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+  context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
   const VkBufferCopy allVertices{0, 0, outputSize}, allPoses{0, 0, needed.size};
   vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), vertices.buffer, 1, &allVertices);
   vkCmdCopyBuffer(engine.commandBuffer, poses.buffer, matrices.buffer, 1, &allPoses);
-  barrier(engine.commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                                 {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+  context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
   must(vkEndCommandBuffer(engine.commandBuffer));
   submit(engine);
   std::uint32_t right = 0;

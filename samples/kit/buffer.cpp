@@ -111,12 +111,12 @@ Result<std::vector<std::byte>> DeviceBuffer::read() const {
       MappedBuffer::create(device, buffer_.size(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
   if (!copy) return copy.error();
   const Result<void> done = device.run([&](VkCommandBuffer commandBuffer) -> Result<void> {
-    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+    recordBarrier(device, commandBuffer,
+                  vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyRead));
     const VkBufferCopy all{0, 0, buffer_.size()};
     device.functions().CmdCopyBuffer(commandBuffer, buffer_.handle(), copy->handle(), 1, &all);
     recordBarrier(device, commandBuffer,
-                  {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+                  vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::hostRead));
     return {};
   });
   if (!done) return done.error();

@@ -460,11 +460,11 @@ std::string driverVersion(const Device& device) {
 }
 
 void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                        dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                        0, nullptr);
+                   const vulkan::Barrier& barrier) {
+  const VkMemoryBarrier memory = barrier;
+  device.functions().CmdPipelineBarrier(commandBuffer, barrier.sourceStages,
+                                        barrier.destinationStages, 0, 1, &memory, 0, nullptr, 0,
+                                        nullptr);
 }
 
 Error vulkanError(const std::string& function, VkResult result) {

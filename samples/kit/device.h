@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "dermis/result.h"
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
-#include "dermis/vulkan/scope.h"
 #include "kit/device_extensions.h"
 #include "kit/vulkan_loader.h"
 
@@ -138,7 +138,7 @@ std::string driverVersion(const Device& device);
 
 /// A global memory barrier.
 void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Dependency& dependency);
+                   const vulkan::Barrier& barrier);
 
 /// The error of a Vulkan function.
 Error vulkanError(const std::string& function, VkResult result);

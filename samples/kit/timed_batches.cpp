@@ -3,7 +3,7 @@
 #include <cstring>
 #include <utility>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 
 namespace dermis::samples {
 
@@ -54,12 +54,13 @@ Result<void> TimedBatches::record(TimedBatch& batch) {
   begin.flags = VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
   batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
-  recordBarrier(*device_, batch.commandBuffer,
-                vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+  context_->recordBarrier(batch.commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
   timestamps_.recordBegin(batch.commandBuffer);
   const Result<void> done = context_->record(batch.commandBuffer, batch.plan, *batch.bindings);
   timestamps_.recordEnd(batch.commandBuffer);
-  recordBarrier(*device_, batch.commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+  context_->recordBarrier(batch.commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
   functions.EndCommandBuffer(batch.commandBuffer);
   return done;
 }

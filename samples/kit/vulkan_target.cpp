@@ -47,9 +47,11 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
 Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,
                     const vulkan::Bindings& bindings) {
   return device.run([&](VkCommandBuffer commandBuffer) {
-    recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+    context.recordBarrier(commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
     Result<void> done = context.record(commandBuffer, plan, bindings);
-    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::hostRead));
+    context.recordBarrier(commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
     return done;
   });
 }

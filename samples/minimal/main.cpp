@@ -21,6 +21,7 @@
 #include "dermis/vulkan/vulkan.h"
 
 using namespace dermis;
+using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 3;
 
@@ -107,14 +108,6 @@ Engine makeEngine(std::uint32_t readBackSize) {
   return engine;
 }
 
-// [barrier]
-void barrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) {
-  const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
-  vkCmdPipelineBarrier(commandBuffer, dependency.source.stages, dependency.destination.stages, 0, 1,
-                       &memory, 0, nullptr, 0, nullptr);
-}
-// [/barrier]
-
 // -- The character: a strip of two joints.
 
 struct Strip {
@@ -181,15 +174,14 @@ int main() {
     // `frame - 1`: the newest frame that the GPU has completed. This program waits for each.
     must(scene.beginFrame(frame, frame - 1));
     std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
-    barrier(engine.commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transfer));
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
     must(scene.record(engine.commandBuffer));
-    barrier(engine.commandBuffer, vulkan::outputScope(vulkan::Consumer::transfer));
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
     // [/frame]
     // An engine draws here. This program copies the vertices to compare them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
     vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), engine.readBack, 1, &copy);
-    barrier(engine.commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                                   {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
     must(vkEndCommandBuffer(engine.commandBuffer));
     auto submit = structure<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
     submit.commandBufferCount = 1;

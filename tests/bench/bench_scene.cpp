@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 
 namespace dermis::bench {
 namespace {
@@ -78,10 +78,8 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   device.functions().BeginCommandBuffer(commandBuffer_, &begin);
-  const vulkan::Dependency edge = vulkan::inputScope(vulkan::PreviousUse::previousRecord);
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(edge);
-  device.functions().CmdPipelineBarrier(commandBuffer_, edge.source.stages, edge.destination.stages,
-                                        0, 1, &barrier, 0, nullptr, 0, nullptr);
+  open.context.recordBarrier(commandBuffer_,
+                             vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
   orStop(open.context.record(commandBuffer_, plan_, *bindings_));
   device.functions().EndCommandBuffer(commandBuffer_);
   // The first time drivers compile, and memory is touched.

@@ -203,8 +203,8 @@ TEST(DocumentationTest, WhatIsReadFirstIsShort) {
   EXPECT_GT(shown, 30);
   EXPECT_LE(shown, 60);
 
-  EXPECT_EQ(namesToLearn(code, "samples/minimal"), 13);
-  EXPECT_EQ(namesToLearn(readText("samples/embed/main.cpp"), "samples/embed"), 20);
+  EXPECT_EQ(namesToLearn(code, "samples/minimal"), 11);
+  EXPECT_EQ(namesToLearn(readText("samples/embed/main.cpp"), "samples/embed"), 18);
 }
 
 }  // namespace

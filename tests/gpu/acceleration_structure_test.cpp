@@ -22,7 +22,7 @@
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/verify/reference.h"
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "kit/buffer.h"
 #include "random_rig.h"
 #include "ray_tracing.h"
@@ -220,12 +220,7 @@ class AccelerationStructureTest : public DeviceTest,
     return geometryOf(triangles);
   }
 
-  void barrier(const vulkan::Dependency& dependency) {
-    const VkMemoryBarrier memory = vulkan::memoryBarrier(dependency);
-    device().functions().CmdPipelineBarrier(commandBuffer_, dependency.source.stages,
-                                            dependency.destination.stages, 0, 1, &memory, 0,
-                                            nullptr, 0, nullptr);
-  }
+  void barrier(const vulkan::Barrier& barrier) { context().recordBarrier(commandBuffer_, barrier); }
 
   /// Between the engine's own uses of its acceleration structures and their scratch memory: builds,
   /// and rays where there are any.
@@ -233,7 +228,7 @@ class AccelerationStructureTest : public DeviceTest,
     VkPipelineStageFlags stages = VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR;
     if (device().info().rayQueries) stages |= VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
     constexpr VkAccessFlags write = VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR;
-    barrier({{stages, write}, {stages, write | VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR}});
+    barrier({stages, write, stages, write | VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR});
   }
 
   void begin() {
@@ -244,7 +239,7 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   void submit() {
-    barrier(vulkan::outputScope(vulkan::Consumer::hostRead));
+    barrier(vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
     device().functions().EndCommandBuffer(commandBuffer_);
     const Result<void> done = device().submitAndWait(commandBuffer_);
     EXPECT_TRUE(done.ok()) << (done ? "" : done.error().message);
@@ -256,7 +251,7 @@ class AccelerationStructureTest : public DeviceTest,
                     AccelerationStructure& bottom, Scene& scene) {
     const Result<void> recorded = context().record(commandBuffer_, pose.plan, *pose.bindings);
     ASSERT_TRUE(recorded.ok()) << recorded.error().message;
-    barrier(vulkan::outputScope(vulkan::Consumer::accelerationStructureBuild));
+    barrier(vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::accelerationStructureBuild));
     bottom.record(commandBuffer_, mode, geometry(pose));
     structureBarrier();
     scene.build(commandBuffer_);
@@ -302,8 +297,8 @@ TEST_P(AccelerationStructureTest, HoldsWhatWasSkinnedWhenBuiltAndWhenRefitted) {
   ASSERT_NO_FATAL_FAILURE(
       skinAndBuild(first, VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR, bottom, scene));
   caster.record(commandBuffer_, scene, first.rays);
-  barrier(vulkan::inputScope(vulkan::PreviousUse::accelerationStructureBuild) |
-          vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+  barrier(vulkan::barrierBetween(vulkan::Use::accelerationStructureBuild | vulkan::Use::dermis,
+                                 vulkan::Use::dermis));
   structureBarrier();
   ASSERT_NO_FATAL_FAILURE(
       skinAndBuild(second, VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR, bottom, scene));

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "dermis_test_shaders.h"
 #include "kit/batch_runner.h"
 #include "kit/buffer.h"
@@ -106,13 +106,8 @@ class ValueDrawer {
                                      VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, read.handle(), 1,
                                      &region);
     }
-    const vulkan::Dependency toHost = vulkan::outputScope(vulkan::Consumer::hostRead);
-    VkMemoryBarrier barrier{};
-    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-    barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-    barrier.dstAccessMask = toHost.destination.accesses;
-    functions.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                                 toHost.destination.stages, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+    recordBarrier(device_, commands,
+                  vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::hostRead));
     must(functions.EndCommandBuffer(commands));
     must(device_.submitAndWait(commands));
     device_.freeCommandBuffer(commands);

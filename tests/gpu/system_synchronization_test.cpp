@@ -99,11 +99,12 @@ class BusyScene {
  private:
   void cull(VkCommandBuffer commandBuffer) {
     // The last frame's words have been read by a kernel.
-    engine_.recordBarrier(commandBuffer, {{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0},
-                                          {VK_PIPELINE_STAGE_TRANSFER_BIT, 0}});
+    engine_.recordBarrier(commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyWrite));
     device_.functions().CmdFillBuffer(commandBuffer, visibility_.handle(), 0, VK_WHOLE_SIZE,
                                       engine_.frame() % 5 != 0 ? 1 : 0);
-    engine_.recordBarrier(commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transferWrite));
+    engine_.recordBarrier(commandBuffer,
+                          vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::dermis));
   }
   void draw(VkCommandBuffer commandBuffer) {
     const VkBufferCopy all{0, 0, size_};
@@ -214,15 +215,17 @@ class EventfulFrames {
       return forgets(stageNames(source) + " to " + stageNames(destination));
     };
     engine.recordsBarriers = events.draws;
-    engine.forgetsBarrier = [&](const vulkan::Dependency& dependency) {
-      return forgets("the engine's " + stageNames(dependency.source.stages) + " to " +
-                     stageNames(dependency.destination.stages));
+    engine.forgetsBarrier = [&](const vulkan::Barrier& barrier) {
+      return forgets("the engine's " + stageNames(barrier.sourceStages) + " to " +
+                     stageNames(barrier.destinationStages));
     };
     engine.beforeRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.culls) return;
-      engine.recordBarrier(commandBuffer, vulkan::overwriteScope(vulkan::Writer::transfer));
+      engine.recordBarrier(commandBuffer,
+                           vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyWrite));
       device.functions().CmdFillBuffer(commandBuffer, words.handle(), 0, VK_WHOLE_SIZE, 1);
-      engine.recordBarrier(commandBuffer, vulkan::inputScope(vulkan::PreviousUse::transferWrite));
+      engine.recordBarrier(commandBuffer,
+                           vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::dermis));
     };
     engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.draws) return;

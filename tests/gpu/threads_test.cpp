@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
-#include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "intercepted_device.h"
 #include "kit/buffer.h"
@@ -103,11 +103,8 @@ class ThreadsTest : public DeviceTest {
 
   /// Each repeat uses the palettes and the output of the one before.
   void recordEdge(VkCommandBuffer commandBuffer) {
-    const vulkan::Dependency dependency = vulkan::inputScope(vulkan::PreviousUse::previousRecord);
-    const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-    device().functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                            dependency.destination.stages, 0, 1, &barrier, 0,
-                                            nullptr, 0, nullptr);
+    context().recordBarrier(commandBuffer,
+                            vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
   }
 
   samples::MappedBuffer upload(const PackedMesh& mesh) {

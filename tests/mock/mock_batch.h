@@ -22,12 +22,11 @@ inline VkBuffer bufferOf(BufferRole role) {
   return reinterpret_cast<VkBuffer>((std::uintptr_t{1} << 21) + static_cast<std::uintptr_t>(role));
 }
 
-inline void expectDependency(const vulkan::Dependency& dependency, const vulkan::Scope& source,
-                             const vulkan::Scope& destination) {
-  EXPECT_EQ(dependency.source.stages, source.stages);
-  EXPECT_EQ(dependency.source.accesses, source.accesses);
-  EXPECT_EQ(dependency.destination.stages, destination.stages);
-  EXPECT_EQ(dependency.destination.accesses, destination.accesses);
+inline void expectBarrier(const vulkan::Barrier& barrier, const vulkan::Barrier& expected) {
+  EXPECT_EQ(barrier.sourceStages, expected.sourceStages);
+  EXPECT_EQ(barrier.sourceAccesses, expected.sourceAccesses);
+  EXPECT_EQ(barrier.destinationStages, expected.destinationStages);
+  EXPECT_EQ(barrier.destinationAccesses, expected.destinationAccesses);
 }
 
 /// A batch, its plan, and buffers as large as the plan needs.

@@ -212,7 +212,7 @@ void VKAPI_CALL cmdPipelineBarrier(VkCommandBuffer, VkPipelineStageFlags before,
   mock->commands.push_back("barrier");
   for (std::uint32_t i = 0; i < memoryCount; ++i) {
     mock->memoryBarriers.push_back(
-        {{before, memory[i].srcAccessMask}, {after, memory[i].dstAccessMask}});
+        {before, memory[i].srcAccessMask, after, memory[i].dstAccessMask});
   }
   mock->bufferBarriers.insert(mock->bufferBarriers.end(), buffers, buffers + bufferCount);
 }

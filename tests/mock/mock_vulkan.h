@@ -12,8 +12,8 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
-#include "dermis/vulkan/scope.h"
 
 namespace dermis::test {
 
@@ -76,7 +76,7 @@ struct MockVulkan {
   std::set<std::string> requested;    ///< every entry point that was asked for
   std::map<std::string, int> alive;   ///< objects by kind, created and not destroyed
   std::vector<std::string> commands;  ///< what was recorded
-  std::vector<vulkan::Dependency> memoryBarriers;
+  std::vector<vulkan::Barrier> memoryBarriers;
   std::vector<VkBufferMemoryBarrier> bufferBarriers;
   std::vector<MockCopy> copies;
   bool wrongAllocator = false;  ///< an object came or went without the engine's allocator

@@ -497,8 +497,8 @@ TEST_F(RecordTest, RecordsTheBarrierBetweenItsPassesAndNoOther) {
     ASSERT_EQ(mock.memoryBarriers.size(), 1u);
     // The skin kernel reads palettes, and adds to results, that the palette kernel wrote.
     constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
-    expectDependency(mock.memoryBarriers[0], {compute, VK_ACCESS_SHADER_WRITE_BIT},
-                     {compute, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT});
+    expectBarrier(mock.memoryBarriers[0], {compute, VK_ACCESS_SHADER_WRITE_BIT, compute,
+                                           VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT});
   }
 }
 

@@ -17,15 +17,13 @@
 namespace dermis::test {
 namespace {
 
-using vulkan::Scope;
 using vulkan::SkinningSystem;
 using vulkan::SkinningSystemDescription;
 
 const VkBuffer visibility = reinterpret_cast<VkBuffer>(std::uintptr_t{1} << 22);
 
-constexpr Scope computeOrCopy(VkAccessFlags accesses) {
-  return {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT, accesses};
-}
+constexpr VkPipelineStageFlags copies = VK_PIPELINE_STAGE_TRANSFER_BIT,
+                               computeOrCopy = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | copies;
 constexpr VkAccessFlags writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
 constexpr VkAccessFlags reads = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT;
 
@@ -253,16 +251,14 @@ TEST_F(MockSystemTest, GrowthAndUploadsHaveTheirBarriers) {
                                              "barrier"}))
       << "meshes, outputs and results; an upload; the plan";
   ASSERT_GE(mock.memoryBarriers.size(), 4u);
-  constexpr VkPipelineStageFlags copies = VK_PIPELINE_STAGE_TRANSFER_BIT;
-  expectDependency(mock.memoryBarriers[0], computeOrCopy(writes),
-                   {copies, VK_ACCESS_TRANSFER_READ_BIT});
-  expectDependency(mock.memoryBarriers[1], {copies, VK_ACCESS_TRANSFER_WRITE_BIT},
-                   computeOrCopy(reads | writes));
-  const vulkan::Dependency upload = vulkan::overwriteScope(vulkan::Writer::transfer);
-  expectDependency(mock.memoryBarriers[2], upload.source, upload.destination);
-  Scope before = computeOrCopy(writes);
-  before.stages |= VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
-  expectDependency(mock.memoryBarriers[3], before, computeOrCopy(reads | writes));
+  expectBarrier(mock.memoryBarriers[0],
+                {computeOrCopy, writes, copies, VK_ACCESS_TRANSFER_READ_BIT});
+  expectBarrier(mock.memoryBarriers[1],
+                {copies, VK_ACCESS_TRANSFER_WRITE_BIT, computeOrCopy, reads | writes});
+  expectBarrier(mock.memoryBarriers[2],
+                vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyWrite));
+  expectBarrier(mock.memoryBarriers[3], {computeOrCopy | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
+                                         writes, computeOrCopy, reads | writes});
   const MockCopy& copy = mock.copies[2];
   ASSERT_EQ(copy.regions.size(), 1u);
   EXPECT_EQ(copy.regions[0].size, results);

@@ -7,9 +7,8 @@
 
 namespace dermis::test {
 
-using vulkan::Consumer;
-using vulkan::Dependency;
-using vulkan::PreviousUse;
+using vulkan::barrierBetween;
+using vulkan::Use;
 
 SystemEngine::SystemEngine(samples::Device& device,
                            const vulkan::SkinningSystemDescription& description)
@@ -57,7 +56,7 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
                 [&](const GpuWrite& write) { return !system_.poseRange(write.pose).ok(); });
   if (gpuWrites_.empty()) return;
   if (recordsPoseBarriers)
-    recordBarrier(commandBuffer, vulkan::overwriteScope(vulkan::Writer::transfer));
+    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
   for (const GpuWrite& write : gpuWrites_) {
     const vulkan::BufferRange range = must(system_.poseRange(write.pose));
     const std::size_t size = write.matrices.size() * sizeof(JointMatrix);
@@ -67,7 +66,7 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
     must(system_.markWritten({&write.pose, 1}));
   }
   if (recordsPoseBarriers)
-    recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transferWrite));
+    recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::dermis));
 }
 
 void SystemEngine::begin(std::uint32_t underWay) {
@@ -80,10 +79,10 @@ Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
                                        const vulkan::FrameDescription& frame) {
   if (beforeRecord) beforeRecord(commandBuffer);
   writeGpuPoses(commandBuffer);
-  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::inputScope(PreviousUse::transfer));
+  if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
   const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
                                                  : system_.record(commandBuffer, frame);
-  if (recordsBarriers) recordBarrier(commandBuffer, vulkan::outputScope(Consumer::transfer));
+  if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
   if (afterRecord) afterRecord(commandBuffer);
   return recorded;
 }
@@ -171,12 +170,9 @@ void SystemEngine::submitNow(const std::function<void(VkCommandBuffer)>& record)
 }
 
 void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer,
-                                 const Dependency& dependency) const {
-  if (forgetsBarrier && forgetsBarrier(dependency)) return;
-  const VkMemoryBarrier barrier = vulkan::memoryBarrier(dependency);
-  device_.functions().CmdPipelineBarrier(commandBuffer, dependency.source.stages,
-                                         dependency.destination.stages, 0, 1, &barrier, 0, nullptr,
-                                         0, nullptr);
+                                 const vulkan::Barrier& barrier) const {
+  if (!forgetsBarrier || !forgetsBarrier(barrier))
+    samples::recordBarrier(device_, commandBuffer, barrier);
 }
 
 std::vector<std::byte> SystemEngine::readOutput() {
@@ -185,12 +181,11 @@ std::vector<std::byte> SystemEngine::readOutput() {
                                                    VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   }
   submitNow([this](VkCommandBuffer commandBuffer) {
-    recordBarrier(commandBuffer, vulkan::outputScope(Consumer::transfer));
+    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
     const VkBufferCopy all{0, 0, outputSize_};
     device_.functions().CmdCopyBuffer(commandBuffer, system_.outputBuffer(), readBack_.handle(), 1,
                                       &all);
-    recordBarrier(commandBuffer, {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                                  {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+    recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
   });
   const std::span<const std::byte> bytes = readBack_.bytes().first(outputSize_);
   return {bytes.begin(), bytes.end()};
@@ -198,17 +193,11 @@ std::vector<std::byte> SystemEngine::readOutput() {
 
 void SystemEngine::fillOutput(std::byte value) {
   submitNow([&](VkCommandBuffer commandBuffer) {
-    const Dependency before =
-        vulkan::inputScope(PreviousUse::previousRecord);  // its writes; ours are a transfer's
-    recordBarrier(commandBuffer,
-                  {before.source, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}});
+    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
     device_.functions().CmdFillBuffer(commandBuffer, system_.outputBuffer(), 0, VK_WHOLE_SIZE,
                                       std::to_integer<std::uint32_t>(value) * 0x01010101u);
     recordBarrier(commandBuffer,
-                  {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                   {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
-                    VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
-                        VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT}});
+                  barrierBetween(Use::copyWrite, Use::dermis | Use::copyRead | Use::copyWrite));
   });
 }
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "dermis/scene.h"
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
@@ -76,7 +76,7 @@ class SystemEngine {
 
   /// Submits what `record` records, and waits for it and all before.
   void submitNow(const std::function<void(VkCommandBuffer)>& record);
-  void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Dependency& dependency) const;
+  void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Barrier& barrier) const;
 
   /// Called in each frame before and behind the system's commands.
   std::function<void(VkCommandBuffer)> beforeRecord, afterRecord;
@@ -85,7 +85,7 @@ class SystemEngine {
   /// For tests of what happens without: the engine's own barriers around `record`, those around
   /// writes to poses, and each of them.
   bool recordsBarriers = true, recordsPoseBarriers = true;
-  std::function<bool(const vulkan::Dependency&)> forgetsBarrier;
+  std::function<bool(const vulkan::Barrier&)> forgetsBarrier;
 
  private:
   struct SubmittedFrame {

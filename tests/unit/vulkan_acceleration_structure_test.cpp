@@ -10,8 +10,6 @@
 #include <limits>
 #include <string>
 
-#include "dermis/vulkan/scope.h"
-
 namespace dermis::vulkan {
 namespace {
 
@@ -110,23 +108,6 @@ TEST(BuildGeometryTest, ABoxWithoutExtentHasNoTransform) {
   const auto transform = boxTransform({{-largest, 0, 0}, {largest, 1, 1}});
   ASSERT_TRUE(transform.ok());
   EXPECT_EQ(transform->matrix[0][0], largest);
-}
-
-// Vulkan 1.3, "Acceleration Structure Builds": vertices are read as shader reads in the stage of
-// the build.
-TEST(BuildGeometryTest, TheScopesAreThoseOfABuildsInput) {
-  const Dependency after = outputScope(Consumer::accelerationStructureBuild);
-  EXPECT_EQ(after.source.stages, VkPipelineStageFlags{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT});
-  EXPECT_EQ(after.source.accesses, VkAccessFlags{VK_ACCESS_SHADER_WRITE_BIT});
-  EXPECT_EQ(after.destination.stages,
-            VkPipelineStageFlags{VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR});
-  EXPECT_EQ(after.destination.accesses, VkAccessFlags{VK_ACCESS_SHADER_READ_BIT});
-
-  const Dependency before = inputScope(PreviousUse::accelerationStructureBuild);
-  EXPECT_EQ(before.source.stages,
-            VkPipelineStageFlags{VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR});
-  EXPECT_EQ(before.source.accesses, VkAccessFlags{0}) << "what was only read need not be flushed";
-  EXPECT_EQ(before.destination.stages, VkPipelineStageFlags{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT});
 }
 
 TEST(BuildGeometryTest, TheUsageIsThatOfABuildsInput) {

@@ -417,7 +417,7 @@ class DERMIS_CORE_API Plan {
   /// the first that needs it. For a scene, in this order: a barrier that waits for earlier accesses
   /// (compute, copy, indirect); copies and clears; the kernels; copies to `readBack`; a barrier
   /// before the host reads. In both cases the engine records the barriers between these commands
-  /// and its own use of the output (vulkan/scope.h).
+  /// and its own use of the output (vulkan/barrier.h).
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;

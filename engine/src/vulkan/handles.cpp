@@ -6,7 +6,6 @@
 namespace dermis::vulkan {
 
 static_assert(apiVersion11 == VK_API_VERSION_1_1);
-static_assert(queueFamilyIgnored == VK_QUEUE_FAMILY_IGNORED);
 static_assert(vertexBufferUsage == VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
 
 }  // namespace dermis::vulkan

@@ -5,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "plan/placement.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
@@ -128,6 +128,10 @@ Result<void> BindingsState::check(const Plan& plan) const {
 
 namespace {
 
+struct Scope {
+  VkPipelineStageFlags stages = 0;
+  VkAccessFlags accesses = 0;
+};
 Scope scopeOf(Access accesses) {
   struct Part {
     Access access;
@@ -164,10 +168,8 @@ class Recorder {
     const Scope before = scopeOf(barrier.before), after = scopeOf(barrier.after);
     // After reads alone, no memory has to be made visible.
     constexpr VkAccessFlags writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
-    const VkMemoryBarrier memory =
-        memoryBarrier({{before.stages, before.accesses & writes}, after});
-    table_.cmdPipelineBarrier(commandBuffer_, before.stages, after.stages, 0, 1, &memory, 0,
-                              nullptr, 0, nullptr);
+    context_.recordBarrier(commandBuffer_,
+                           {before.stages, before.accesses & writes, after.stages, after.accesses});
   }
 
   void operator()(const ClearCommand& clear) {

@@ -35,6 +35,7 @@ struct ContextState {
   std::uint32_t texelBindingCount() const {
     return limits.texelBuffers ? abi::TEXEL_BINDING_COUNT : 0;
   }
+  void recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const;
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
   Result<void> prepare(std::span<const Variant> variants) const;

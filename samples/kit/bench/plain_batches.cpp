@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "plain_kernels.h"
 
 namespace dermis::samples {
@@ -199,8 +199,7 @@ Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer co
                                        4, &jointTotal);
   device_.functions().CmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
   recordBarrier(device_, commandBuffer,
-                {{VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT},
-                 {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT}});
+                vulkan::barrierBetween(vulkan::Use::computeWrite, vulkan::Use::computeRead));
   return {};
 }
 
@@ -242,7 +241,9 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
       !begun)
     return begun;
   // After the previous execution.
-  recordBarrier(device_, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::previousRecord));
+  recordBarrier(device_, commandBuffer,
+                vulkan::barrierBetween(vulkan::Use::computeWrite,
+                                       vulkan::Use::computeWrite | vulkan::Use::computeRead));
   timestamps_.recordBegin(commandBuffer);
   if (kernel == PlainKernel::dualQuaternion) {
     if (Result<void> recorded = recordPalettes(crowd, commandBuffer); !recorded) return recorded;

@@ -213,8 +213,7 @@ void RenderTarget::recordReadBack(const Device& device, VkCommandBuffer commandB
                                           VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readBack_.handle(),
                                           1, &copy);
   recordBarrier(device, commandBuffer,
-                {{VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-                 {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}});
+                vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::hostRead));
 }
 
 std::vector<std::uint8_t> RenderTarget::pixels() const {

@@ -65,7 +65,10 @@ struct Options {
 class SkinnedCrowd {
  public:
   SkinnedCrowd(vulkan::Context& context, const Character& character, const Stroll& stroll)
-      : character_(&character), stroll_(&stroll), system_(create(context, character, stroll)) {
+      : context_(&context),
+        character_(&character),
+        stroll_(&stroll),
+        system_(create(context, character, stroll)) {
     std::vector<MeshHandle> meshes;
     for (const Part& part : character.parts()) meshes.push_back(must(system_.addMesh(part.packed)));
     for (std::uint32_t index = 0; index < stroll.count(); ++index) {
@@ -82,8 +85,7 @@ class SkinnedCrowd {
     }
   }
 
-  void skinFrame(const samples::Device& device, std::uint64_t frame, std::uint64_t completedFrame,
-                 VkCommandBuffer commandBuffer) {
+  void skinFrame(std::uint64_t frame, std::uint64_t completedFrame, VkCommandBuffer commandBuffer) {
     must(system_.beginFrame(frame, completedFrame));
     std::vector<InstanceVisibility> visibility;
     for (std::uint32_t index = 0; index < figures_.size(); ++index) {
@@ -100,9 +102,11 @@ class SkinnedCrowd {
         std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
       }
     }
-    recordBarrier(device, commandBuffer, vulkan::inputScope(vulkan::PreviousUse::vertexInput));
+    context_->recordBarrier(commandBuffer,
+                            vulkan::barrierBetween(vulkan::Use::vertexInput, vulkan::Use::dermis));
     must(system_.record(commandBuffer));
-    recordBarrier(device, commandBuffer, vulkan::outputScope(vulkan::Consumer::vertexInput));
+    context_->recordBarrier(commandBuffer,
+                            vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::vertexInput));
   }
 
   /// The figures in the picture. Near ones are first, so that hidden ones are not shaded.
@@ -158,6 +162,7 @@ class SkinnedCrowd {
     return must(vulkan::SkinningSystem::create(description));
   }
 
+  const vulkan::Context* context_;
   const Character* character_;
   const Stroll* stroll_;
   vulkan::SkinningSystem system_;
@@ -278,7 +283,7 @@ void film(samples::OpenDevice& open, const Character& character, const Stroll& s
   for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
     const VkCommandBuffer commandBuffer = must(loop.begin());
     writeUpTo(loop.completed());
-    crowd.skinFrame(*open.device, frame, loop.completed(), commandBuffer);
+    crowd.skinFrame(frame, loop.completed(), commandBuffer);
     painter.record(crowd, frame, commandBuffer);
     must(loop.submit());
   }

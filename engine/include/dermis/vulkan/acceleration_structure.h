@@ -5,10 +5,10 @@
 // 1. The output buffer of the positions has `buildInputUsage`, and its memory was allocated with
 //    VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
 // 2. The engine calls `record`, records the barrier
-//    `outputScope(Consumer::accelerationStructureBuild)`, and builds the geometry that `buildInput`
-//    returns.
+//    `barrierBetween(Use::dermis, Use::accelerationStructureBuild)`, and builds the geometry that
+//    `buildInput` returns.
 // 3. Before the next `record` into the same positions, it records the barrier
-//    `inputScope(PreviousUse::accelerationStructureBuild)`.
+//    `barrierBetween(Use::accelerationStructureBuild, Use::dermis)`.
 //
 // Refit from pose to pose (VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR). This is valid as long
 // as the format stays the same, since skinning changes neither the number nor the order of

@@ -10,6 +10,7 @@
 #include "dermis/export.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/handles.h"
 #include "dermis/vulkan/kernels.h"
@@ -135,15 +136,20 @@ class DERMIS_VULKAN_API Context {
   /// Afterwards the compute pipeline, descriptor set 0 of compute and the push constants are
   /// undefined. Graphics state is not changed.
   ///
-  /// The engine records barriers before and after it (scope.h). When the GPU executes the commands,
-  /// the tables buffer must hold the tables of this plan (`writeTables`). The bindings must live
-  /// until the GPU has completed them.
+  /// The engine records barriers before and after it (`recordBarrier`). When the GPU executes the
+  /// commands, the tables buffer must hold the tables of this plan (`writeTables`). The bindings
+  /// must live until the GPU has completed them.
   ///
   /// Fails with `notPrepared` if `prepare` was not called for a method or layout, and with
   /// `invalidArgument` if a buffer is smaller than the plan needs, or if the plan was made for
   /// other limits. If it fails, nothing is recorded.
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
+
+  /// Records a barrier for all memory, as `barrierBetween` returns it. Call it outside a render
+  /// pass. Records nothing if nothing waits: if it has no uses on one side, or is one half of a
+  /// queue transfer. A transfer needs a barrier of its buffer, which the engine records itself.
+  void recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const;
 
  private:
   Context();

@@ -81,7 +81,7 @@ struct FrameDescription {
   /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
   /// holds `SkinningSystem::visibilityCount` words of 4 bytes. An instance is visible if the word
   /// at its `visibilityIndex` is not 0. The engine's culling writes them on the GPU before
-  /// `record`, with the barrier `inputScope(PreviousUse::computeWrite)` in between.
+  /// `record`, with the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between.
   VkBuffer visibility{};
   /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
   VkDeviceSize visibilityOffset = 0;
@@ -189,9 +189,9 @@ class DERMIS_VULKAN_API SkinningSystem {
   /// different buffers. A buffer that the system created has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and
   /// VK_BUFFER_USAGE_TRANSFER_DST_BIT.
   ///
-  /// The engine records the barrier `overwriteScope(Writer::compute)`, as frames in flight may
-  /// still read the matrices, then its pass, then the barrier
-  /// `inputScope(PreviousUse::computeWrite)`; and it calls `markWritten`. Fails with
+  /// The engine records the barrier `barrierBetween(Use::dermis, Use::computeWrite)`, as frames in
+  /// flight may still read the matrices, then its pass, then the barrier
+  /// `barrierBetween(Use::computeWrite, Use::dermis)`; and it calls `markWritten`. Fails with
   /// `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
   /// As `Scene::markWritten`.
@@ -214,8 +214,8 @@ class DERMIS_VULKAN_API SkinningSystem {
   /// Records the uploads and the commands of the frame (`Scene::plan`), with the barriers between
   /// them. Records nothing if nothing changed and no instance is culled on the GPU. Call it once
   /// after each `beginFrame`, outside a render pass, with a primary or secondary command buffer.
-  /// Before it the engine records the barrier `inputScope` for the last use of the output, and
-  /// after it the barrier `outputScope` for the next use (scope.h).
+  /// Before it the engine records the barrier from the last use of the output to `Use::dermis`, and
+  /// after it the barrier from `Use::dermis` to the next use (barrier.h).
   ///
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;

@@ -3,10 +3,10 @@
 // VK_NO_PROTOTYPES.
 #pragma once
 
+#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/buffer_callbacks.h"
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/handles.h"
 #include "dermis/vulkan/kernels.h"
-#include "dermis/vulkan/scope.h"
 #include "dermis/vulkan/skinning_system.h"

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <utility>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {
@@ -84,11 +84,7 @@ Result<void> SkinningSystem::State::recordFrame(VkCommandBuffer commandBuffer,
 Recorded SkinningSystem::State::recordUploads(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   if (uploads.empty()) return recorded;
-  const Dependency overwrite = overwriteScope(Writer::transfer);
-  const VkMemoryBarrier barrier = memoryBarrier(overwrite);
-  context->table.cmdPipelineBarrier(commandBuffer, overwrite.source.stages,
-                                    overwrite.destination.stages, 0, 1, &barrier, 0, nullptr, 0,
-                                    nullptr);
+  context->recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
   for (MeshUpload& upload : uploads) {
     const BufferRange to = meshes.range();
     const VkBufferCopy region{0, to.offset + upload.offset, upload.staging.size()};

@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "dermis/vulkan/scope.h"
+#include "dermis/vulkan/barrier.h"
 #include "vulkan/system/state.h"
 
 namespace dermis::vulkan {
@@ -188,15 +188,8 @@ Recorded SkinningSystem::State::recordGrowth(VkCommandBuffer commandBuffer) {
   Recorded recorded;
   if (!isGrowing) return recorded;
   isGrowing = false;
-  const auto barrier = [&](const Scope& before, const Scope& after) {
-    const VkMemoryBarrier memory = memoryBarrier({before, after});
-    context->table.cmdPipelineBarrier(commandBuffer, before.stages, after.stages, 0, 1, &memory, 0,
-                                      nullptr, 0, nullptr);
-  };
-  constexpr VkPipelineStageFlags stages =
-      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
-  barrier({stages, VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT},
-          {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT});
+  constexpr Use earlierAndLater = Use::dermis | Use::copyRead | Use::copyWrite;
+  context->recordBarrier(commandBuffer, barrierBetween(earlierAndLater, Use::copyRead));
   for (GrowingBuffer* buffer : {&meshes, &palettes, &output, &results, &history}) {
     if (buffer->larger.size() == 0) continue;
     if (buffer->own.size() != 0 && buffer != &palettes) {
@@ -209,9 +202,7 @@ Recorded SkinningSystem::State::recordGrowth(VkCommandBuffer commandBuffer) {
         {buffer, std::exchange(buffer->own, std::exchange(buffer->larger, SystemBuffer()))});
     if (buffer == &output) ++outputGeneration;
   }
-  barrier({VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT},
-          {stages, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
-                       VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT});
+  context->recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, earlierAndLater));
   return recorded;
 }
 

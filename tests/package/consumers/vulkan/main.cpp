@@ -115,7 +115,7 @@ int main() {
   std::printf("kernels %016llx\n", static_cast<unsigned long long>(hashOfKernels()));
   if (!hasKernels()) return 1;
   if (!hasChosenKernels()) return 5;
-  if (vulkan::outputScope(vulkan::Consumer::vertexInput).destination.accesses !=
+  if (vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::vertexInput).destinationAccesses !=
       VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT)
     return 2;
 
