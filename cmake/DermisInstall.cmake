@@ -15,7 +15,7 @@ set(dermisHeaders_verify verify)
 set(dermisHeaders_vulkan vulkan)
 set(dermisHeaders_shader_compiler shader_compiler.h)
 set(dermisHeaders_runtime_compiler runtime_compiler.h)
-set(dermisHeaders_gltf gltf.h memory_budget.h)
+set(dermisHeaders_gltf gltf.h)
 
 get_property(dermisLibraries GLOBAL PROPERTY DERMIS_LIBRARIES)
 set(dermisComponents)

@@ -17,7 +17,6 @@
 
 #include "byte_model.h"
 #include "commands.h"
-#include "dermis/text.h"
 #include "dermis/vulkan/skinning_system.h"
 #include "kit/batch_runner.h"
 #include "kit/bench/crowd.h"
@@ -27,6 +26,7 @@
 #include "kit/output_file.h"
 #include "kit/program.h"
 #include "kit/render/picture.h"
+#include "kit/text.h"
 #include "picture_sheet.h"
 
 namespace dermis::cli {
@@ -133,8 +133,8 @@ SheetColor colorOf(ThroughputSection section) {
 
 /// Prints a line for each row.
 void printThroughput(const ThroughputTitle& title, std::span<const ThroughputRow> rows) {
-  fmt::print("device   {}\n", oneLine(whereItWasMeasured(title)));
-  fmt::print("model    {}\n", oneLine(whatWasMeasured(title)));
+  fmt::print("device   {}\n", samples::oneLine(whereItWasMeasured(title)));
+  fmt::print("model    {}\n", samples::oneLine(whatWasMeasured(title)));
   if (title.startUp) {
     fmt::print(
         "start    {:.0f} ms from Context::create to the first frame, {:.0f} ms if no joint "

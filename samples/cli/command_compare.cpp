@@ -16,13 +16,13 @@
 #include "commands.h"
 #include "comparison.h"
 #include "comparison_picture.h"
-#include "dermis/text.h"
 #include "kit/batch_runner.h"
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/output_file.h"
 #include "kit/program.h"
 #include "kit/render/picture.h"
+#include "kit/text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -67,10 +67,10 @@ std::string_view sourceName(InstructionSource source) {
 }
 
 void printTitle(const ComparisonTitle& title, const MethodComparison& comparison) {
-  fmt::print(
-      "device   {}\n",
-      oneLine(title.driver.empty() ? title.device : title.device + ", driver " + title.driver));
-  fmt::print("model    {}, {}\n", oneLine(title.model), oneLine(title.pose));
+  fmt::print("device   {}\n",
+             samples::oneLine(title.driver.empty() ? title.device
+                                                   : title.device + ", driver " + title.driver));
+  fmt::print("model    {}, {}\n", samples::oneLine(title.model), samples::oneLine(title.pose));
   fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
              comparison.scales ? ", some of which scale or shear" : "");
   if (comparison.clock == Clock::none) {
@@ -232,14 +232,14 @@ ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vecto
     ComparisonStrip& strip = sheet.strips.emplace_back();
     strip.scene = &*subject.model;
     strip.pose = subject.pose;
-    strip.title = oneLine(std::filesystem::path(subject.name).filename().string());
-    strip.remark = oneLine(subject.poseName) + "; skinning time";
+    strip.title = samples::oneLine(std::filesystem::path(subject.name).filename().string());
+    strip.remark = samples::oneLine(subject.poseName) + "; skinning time";
   } else {
     sheet.strips.back().remark += "; skinning time";
   }
   sheet.strips.back().showsCost = true;
   sheet.strips.back().hasHeatMap = true;
-  sheet.footer = oneLine(fmt::format(
+  sheet.footer = samples::oneLine(fmt::format(
       "Time: median of {}, {} of {} vertices, {}", counted(comparison.repetitions, "run"),
       counted(comparison.instances, "instance"), comparison.vertices, title.device));
   return sheet;
@@ -307,7 +307,8 @@ ExitStatus checkUsage(const CompareOptions& options) {
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
   if (clip == gltf::none) return "rest pose";
   const std::string& name = model.clips[clip].name;
-  return fmt::format("clip {}{} at {:.3f} s", clip, name.empty() ? "" : " " + inQuotes(name),
+  return fmt::format("clip {}{} at {:.3f} s", clip,
+                     name.empty() ? "" : " " + samples::inQuotes(name),
                      std::clamp(time, 0.0, model.clips[clip].duration));
 }
 

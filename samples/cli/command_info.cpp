@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "dermis/text.h"
+#include "kit/text.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {
@@ -69,7 +69,7 @@ Json describe(const Scene& scene, const InfoOptions& options) {
 }
 
 void printText(const Json& json) {
-  const auto text = [](const Json& value) { return oneLine(value.get<std::string>()); };
+  const auto text = [](const Json& value) { return samples::oneLine(value.get<std::string>()); };
   fmt::print("{} skinned primitives, {} skins, {} clips\n", json["meshes"].size(),
              json["skins"].size(), json["clips"].size());
   for (const Json& mesh : json["meshes"]) {
@@ -89,9 +89,11 @@ void printText(const Json& json) {
   std::size_t number = 0;
   for (const Json& clip : json["clips"]) {
     const std::string file =
-        clip.contains("file") ? " of " + inQuotes(clip["file"].get_ref<const std::string&>()) : "";
+        clip.contains("file")
+            ? " of " + samples::inQuotes(clip["file"].get_ref<const std::string&>())
+            : "";
     fmt::print("clip   {} {}{}: {:.3f} s, {} channels\n", number++,
-               inQuotes(clip["name"].get_ref<const std::string&>()), file,
+               samples::inQuotes(clip["name"].get_ref<const std::string&>()), file,
                clip["seconds"].get<double>(), clip["channels"].get<int>());
   }
   for (const Json& note : json["notes"]) fmt::print("note   {}\n", text(note));

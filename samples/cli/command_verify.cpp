@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "commands.h"
-#include "dermis/text.h"
 #include "kit/device.h"
 #include "kit/output_file.h"
 #include "kit/program.h"
+#include "kit/text.h"
 #include "verification.h"
 
 namespace dermis::cli {
@@ -138,16 +138,16 @@ void printReport(const std::vector<ModelVerification>& models) {
       fmt::print(
           "{}  {}  {}: {} poses, {} variants, {} vertices compared{}; worst position {:.2f} of its "
           "bound, normal {:.2f}{}\n",
-          summary.failures == 0 ? "passed" : "FAILED", oneLine(model.model), method,
+          summary.failures == 0 ? "passed" : "FAILED", samples::oneLine(model.model), method,
           summary.poses.size(), summary.variants.size(), summary.vertices, exceptions(summary),
           summary.worstPosition, summary.worstNormal,
           summary.worstTangent > 0 ? fmt::format(", tangent {:.2f}", summary.worstTangent) : "");
     }
     for (const VerifiedCase& verified : model.cases) {
       if (!verified.passed()) {
-        fmt::print("  {}\n",
-                   oneLine(fmt::format("{}, {}, {}, {}: {}", verified.part, verified.method,
-                                       verified.pose, verified.variant, verified.failure())));
+        fmt::print("  {}\n", samples::oneLine(fmt::format("{}, {}, {}, {}: {}", verified.part,
+                                                          verified.method, verified.pose,
+                                                          verified.variant, verified.failure())));
       }
     }
   }

@@ -14,9 +14,9 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/text.h"
 #include "kit/file_name.h"
 #include "kit/output_file.h"
+#include "kit/text.h"
 
 namespace dermis::cli {
 namespace {
@@ -67,7 +67,7 @@ std::string plyFile(const OutputMesh& mesh) {
 /// Makes a name one word. A backslash would join two lines, and a number sign would start a
 /// comment.
 std::string oneWord(const std::string& name) {
-  std::string word = oneLine(name);
+  std::string word = samples::oneLine(name);
   std::replace_if(
       word.begin(), word.end(), [](char c) { return c == ' ' || c == '\\' || c == '#'; }, '_');
   return word;

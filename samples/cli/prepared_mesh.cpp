@@ -10,16 +10,17 @@
 #include <utility>
 
 #include "dermis/centers_of_rotation.h"
-#include "dermis/text.h"
 #include "dermis/validate.h"
+#include "kit/memory_left.h"
 #include "kit/program.h"
 #include "kit/solve_centers.h"
+#include "kit/text.h"
 
 namespace dermis::cli {
 namespace {
 
-/// Whether the budget has the memory of a packed mesh, which a repaired one does not exceed.
-bool spendOnMesh(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
+/// Spends the memory of a packed mesh, which a repaired one does not exceed.
+bool spendOnMesh(const gltf::Primitive& primitive, std::uint64_t& memoryLeft) {
   constexpr std::uint64_t bytesPerVertex = 4 * 16;  // positions, normals, tangents, centers
   constexpr std::uint64_t bytesPerInfluence = 8;    // a weight and a joint
   const std::uint64_t vertices = primitive.vertexCount;
@@ -29,10 +30,11 @@ bool spendOnMesh(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
   for (const gltf::MorphTarget& target : primitive.morphTargets)
     displacements += target.vertices.size() + target.positions.size() + target.normals.size() +
                      target.tangents.size();
-  return budget.spend(vertices, bytesPerVertex) &&
-         budget.spend(vertices * primitive.influencesPerVertex(), bytesPerInfluence) &&
-         budget.spend(primitive.morphTargets.size(), bytesPerTarget) &&
-         budget.spend(displacements, sizeof(float));
+  return samples::spend(memoryLeft, vertices, bytesPerVertex) &&
+         samples::spend(memoryLeft, vertices * primitive.influencesPerVertex(),
+                        bytesPerInfluence) &&
+         samples::spend(memoryLeft, primitive.morphTargets.size(), bytesPerTarget) &&
+         samples::spend(memoryLeft, displacements, sizeof(float));
 }
 
 Error tooLarge(const gltf::Primitive& primitive, std::uint32_t jointCount) {
@@ -90,9 +92,9 @@ MeshView PreparedMesh::view() const {
 
 Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
     const gltf::Primitive& primitive, std::uint32_t jointCount, const MeshPreparation& preparation,
-    gltf::MemoryBudget& budget, const CentersOfPrimitive& centers) {
+    std::uint64_t& memoryLeft, const CentersOfPrimitive& centers) {
   // The packed mesh grows, so that up to half of it may be unused.
-  if (!spendOnMesh(primitive, budget) || !spendOnMesh(primitive, budget))
+  if (!spendOnMesh(primitive, memoryLeft) || !spendOnMesh(primitive, memoryLeft))
     return tooLarge(primitive, jointCount);
   const std::shared_ptr<PreparedMesh> mesh(new PreparedMesh);
   mesh->original_ = mesh->primitive_.emplace(primitive).mesh();
@@ -102,7 +104,7 @@ Result<std::shared_ptr<const PreparedMesh>> PreparedMesh::prepare(
   if (preparation.strict && !mesh->report_.findings.empty())
     return Error{ErrorCode::invalidMesh, mesh->report_.findings.front().message};
   if (!mesh->report_.packable()) {
-    if (!spendOnMesh(primitive, budget)) return tooLarge(primitive, jointCount);
+    if (!spendOnMesh(primitive, memoryLeft)) return tooLarge(primitive, jointCount);
     Result<RepairedMesh> repaired = repair(mesh->original_, jointCount);
     if (!repaired) return repaired.error();
     mesh->repaired_.emplace(std::move(*repaired));
@@ -233,7 +235,7 @@ Error tooMuch(const gltf::Mesh& mesh, const std::string& what) {
   return Error{ErrorCode::limitExceeded,
                fmt::format("mesh {}: its centers of rotation {}; they were not computed, so "
                            "center_of_rotation and bulge_controlled are not available",
-                           inQuotes(mesh.name), what)};
+                           samples::inQuotes(mesh.name), what)};
 }
 
 }  // namespace
@@ -249,20 +251,21 @@ Result<MeshCenters::Centers> MeshCenters::find(const gltf::Mesh& mesh, std::uint
     firstOf[index] = first->second;
     if (isNew) {
       const std::uint64_t vertices = primitive.vertexCount;
-      if (!budget_.spend(vertices, bytesPerJoinedVertex) ||
-          !budget_.spend(vertices * primitive.influencesPerVertex(), bytesPerJoinedInfluence))
+      if (!samples::spend(memoryLeft_, vertices, bytesPerJoinedVertex) ||
+          !samples::spend(memoryLeft_, vertices * primitive.influencesPerVertex(),
+                          bytesPerJoinedInfluence))
         return tooMuch(mesh, "need too much memory");
       const gltf::PrimitiveView view(primitive);
       const Result<RepairedMesh> repaired = repair(view.mesh(), jointCount);
       if (!repaired) return repaired.error();
       joined.addVertices(repaired->view());
     }
-    if (!budget_.spend(primitive.triangles.size(), sizeof(std::uint32_t)) ||
-        !budget_.spend(primitive.vertexCount, 3 * sizeof(float)))
+    if (!samples::spend(memoryLeft_, primitive.triangles.size(), sizeof(std::uint32_t)) ||
+        !samples::spend(memoryLeft_, primitive.vertexCount, 3 * sizeof(float)))
       return tooMuch(mesh, "need too much memory");
     joined.addTriangles(firstOf[index], primitive.triangles.values());
   }
-  if (!budget_.spend(joined.pairCount(), bytesPerPair))
+  if (!samples::spend(memoryLeft_, joined.pairCount(), bytesPerPair))
     return tooMuch(mesh, "need too much memory");
   const MeshView view = joined.view(mesh.name);
   const Result<CenterOfRotationSolver> solver =

@@ -70,7 +70,7 @@ class PreparedMesh {
   static Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::Primitive& primitive,
                                                              std::uint32_t jointCount,
                                                              const MeshPreparation& preparation,
-                                                             gltf::MemoryBudget& budget,
+                                                             std::uint64_t& memoryLeft,
                                                              const CentersOfPrimitive& centers);
   PreparedMesh(const PreparedMesh&) = delete;
   PreparedMesh& operator=(const PreparedMesh&) = delete;
@@ -101,8 +101,8 @@ class MeshCenters {
  public:
   /// `mostTerms` limits the terms of the sums of all meshes together; each takes about 4 ns. The
   /// budget is the file's, and must outlive this object.
-  MeshCenters(std::uint64_t mostTerms, gltf::MemoryBudget& budget)
-      : termsLeft_(mostTerms), budget_(budget) {}
+  MeshCenters(std::uint64_t mostTerms, std::uint64_t& memoryLeft)
+      : termsLeft_(mostTerms), memoryLeft_(memoryLeft) {}
 
   /// The centers of a primitive, 3 floats per vertex. They depend on all primitives of the mesh, so
   /// that primitives agree where they meet. `jointCount` is at most `namedJoints` of the mesh.
@@ -118,7 +118,7 @@ class MeshCenters {
   std::map<std::pair<std::uint32_t, std::uint32_t>, Result<Centers>>
       found_;  ///< by mesh and joints
   std::uint64_t termsLeft_;
-  gltf::MemoryBudget& budget_;
+  std::uint64_t& memoryLeft_;
 };
 
 }  // namespace dermis::cli

@@ -10,8 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/text.h"
 #include "kit/file_name.h"
+#include "kit/memory_left.h"
+#include "kit/text.h"
 #include "prepared_mesh.h"
 
 namespace dermis::cli {
@@ -31,7 +32,7 @@ constexpr std::uint64_t copiesOfName = 8;
 std::string partLabel(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
                       const gltf::Primitive& primitive) {
   const std::string& node = model.nodes[source.node].name;
-  const std::string name = node.empty() ? "" : fmt::format(" {}", inQuotes(node));
+  const std::string name = node.empty() ? "" : fmt::format(" {}", samples::inQuotes(node));
   return fmt::format("node {}{}, mesh '{}'", source.node, name, primitive.name);
 }
 
@@ -60,14 +61,15 @@ bool spendOnParts(gltf::Model& model) {
     const gltf::Mesh& mesh = model.meshes[source.mesh];
     const gltf::Primitive& primitive = mesh.primitives[source.primitive];
     const std::size_t name = std::max(model.nodes[source.node].name.size(), mesh.name.size());
-    if (!model.budget.spend(1, bytesPerPart) || !model.budget.spend(name, copiesOfName) ||
-        !model.budget.spend(mesh.morphTargetCount, bytesPerTarget) ||
-        !model.budget.spend(primitive.vertexCount, bytesPerPosedVertex)) {
+    if (!samples::spend(model.memoryLeft, 1, bytesPerPart) ||
+        !samples::spend(model.memoryLeft, name, copiesOfName) ||
+        !samples::spend(model.memoryLeft, mesh.morphTargetCount, bytesPerTarget) ||
+        !samples::spend(model.memoryLeft, primitive.vertexCount, bytesPerPosedVertex)) {
       return false;
     }
     if (drawn.insert(&primitive).second &&
-        (!model.budget.spend(primitive.triangles.size(), sizeof(std::uint32_t)) ||
-         !model.budget.spend(primitive.vertexCount, bytesPerDrawnVertex))) {
+        (!samples::spend(model.memoryLeft, primitive.triangles.size(), sizeof(std::uint32_t)) ||
+         !samples::spend(model.memoryLeft, primitive.vertexCount, bytesPerDrawnVertex))) {
       return false;
     }
   }
@@ -80,7 +82,7 @@ class Preparer {
   Preparer(Scene& scene, const MeshPreparation& preparation)
       : scene_(scene),
         preparation_(preparation),
-        centers_(preparation.mostCenterTerms, scene.model->budget) {}
+        centers_(preparation.mostCenterTerms, scene.model->memoryLeft) {}
 
   Result<std::shared_ptr<const PreparedMesh>> prepare(const gltf::SkinnedPrimitive& source) {
     gltf::Model& model = *scene_.model;
@@ -104,7 +106,7 @@ class Preparer {
       return std::vector<float>();
     };
     Result<std::shared_ptr<const PreparedMesh>> made =
-        PreparedMesh::prepare(primitive, joints, preparation_, model.budget, findCenters);
+        PreparedMesh::prepare(primitive, joints, preparation_, model.memoryLeft, findCenters);
     if (!made) return made;
     mesh = shared = std::move(*made);
     addFindings(scene_, mesh->report());
@@ -133,7 +135,7 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
   gltf::Model& model = *scene.model;
   scene.notes = model.notes;
   const auto inFile = [&file](const Error& error) {
-    return Error{error.code, fmt::format("{}: {}", inQuotes(file), error.message)};
+    return Error{error.code, fmt::format("{}: {}", samples::inQuotes(file), error.message)};
   };
   if (!spendOnParts(model)) {
     return inFile({ErrorCode::limitExceeded,
@@ -165,7 +167,7 @@ Result<void> addClips(Scene& scene, const MeshPreparation& preparation) {
     const std::filesystem::path path = samples::pathOf(name);
     Result<gltf::Model> loaded = gltf::load(path, {.strict = preparation.strict});
     if (!loaded) return loaded.error();
-    const std::string file = inQuotes(nameOf(path));
+    const std::string file = samples::inQuotes(nameOf(path));
     const auto add = [&](const std::vector<std::string>& notes) {
       for (const std::string& note : notes)
         scene.notes.push_back(fmt::format("{}: {}", file, note));
@@ -251,18 +253,18 @@ Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::st
   if (found.empty()) {
     return Error{ErrorCode::invalidArgument,
                  fmt::format("--animation: there is no clip {}; there {} {} clip{}",
-                             inQuotes(*wanted), model.clips.size() == 1 ? "is" : "are",
+                             samples::inQuotes(*wanted), model.clips.size() == 1 ? "is" : "are",
                              model.clips.size(), model.clips.size() == 1 ? "" : "s")};
   }
   std::string all;
   for (const std::uint32_t clip : found) {
     all += fmt::format("{}{} of {}", all.empty() ? "" : ", ", clip,
-                       inQuotes(nameOf(scene.clipFiles[fileOfClip(scene, clip)].path)));
+                       samples::inQuotes(nameOf(scene.clipFiles[fileOfClip(scene, clip)].path)));
   }
   return Error{
       ErrorCode::invalidArgument,
       fmt::format("--animation: several clips are called {}: {}; give a number or FILE:NAME",
-                  inQuotes(*wanted), all)};
+                  samples::inQuotes(*wanted), all)};
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {

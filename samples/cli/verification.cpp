@@ -10,8 +10,8 @@
 #include <map>
 #include <utility>
 
-#include "dermis/text.h"
 #include "kit/method_rotation.h"
+#include "kit/text.h"
 
 namespace dermis::cli {
 
@@ -306,9 +306,9 @@ std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
   for (std::uint32_t clip = 0; clip < model.clips.size(); ++clip) {
     for (const double share : {0.0, 0.31, 0.77, 1.0}) {
       const double time = share * model.clips[clip].duration;
-      poses.push_back(
-          {clip, time,
-           fmt::format("clip {} {} at {:.4g} s", clip, inQuotes(model.clips[clip].name), time)});
+      poses.push_back({clip, time,
+                       fmt::format("clip {} {} at {:.4g} s", clip,
+                                   samples::inQuotes(model.clips[clip].name), time)});
     }
   }
   return poses;

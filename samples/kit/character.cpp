@@ -6,22 +6,24 @@
 #include <cmath>
 #include <utility>
 
-#include "dermis/text.h"
+#include "kit/memory_left.h"
+#include "kit/text.h"
 
 namespace dermis::samples {
 namespace {
 
 /// Spends the memory of a part: the packed mesh and its views. Many nodes may use one mesh.
-bool spendOnPart(const gltf::Primitive& primitive, gltf::MemoryBudget& budget) {
+bool spendOnPart(const gltf::Primitive& primitive, std::uint64_t& memoryLeft) {
   std::uint64_t displacements = 0;
   for (const gltf::MorphTarget& target : primitive.morphTargets)
     displacements += target.vertices.size() + target.positions.size() + target.normals.size() +
                      target.tangents.size();
   const std::uint64_t perVertex = 64 + std::uint64_t{16} * primitive.influencesPerVertex();
-  return budget.spend(1, sizeof(Part)) && budget.spend(primitive.vertexCount, perVertex) &&
-         budget.spend(primitive.morphTargets.size(),
-                      sizeof(MorphTargetView) + 16 + primitive.vertexCount / 4) &&
-         budget.spend(displacements, 2 * sizeof(float));
+  return spend(memoryLeft, 1, sizeof(Part)) &&
+         spend(memoryLeft, primitive.vertexCount, perVertex) &&
+         spend(memoryLeft, primitive.morphTargets.size(),
+               sizeof(MorphTargetView) + 16 + primitive.vertexCount / 4) &&
+         spend(memoryLeft, displacements, 2 * sizeof(float));
 }
 
 }  // namespace
@@ -43,7 +45,7 @@ Result<Character> Character::load(const std::filesystem::path& path,
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     if (primitive.influences.empty()) continue;
-    if (!spendOnPart(primitive, character.model_->budget)) return tooMuch;
+    if (!spendOnPart(primitive, character.model_->memoryLeft)) return tooMuch;
     const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
     std::uint32_t& skin = numbers[source.skin];
     if (skin == gltf::none) {
@@ -78,7 +80,8 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
   std::uint64_t joints = 0;
   for (const std::uint32_t count : jointCounts_) joints += count;
   // Each tick also computes the transforms of all nodes, which are not kept.
-  if (!model_->budget.spend(sampled.tickCount, joints * sizeof(JointMatrix) + model_->nodes.size()))
+  if (!spend(model_->memoryLeft, sampled.tickCount,
+             joints * sizeof(JointMatrix) + model_->nodes.size()))
     return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
     const std::vector<gltf::GlobalTransform> globals =

@@ -24,8 +24,8 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/text.h"
 #include "kit/output_file.h"
+#include "kit/text.h"
 
 namespace dermis::samples {
 namespace {

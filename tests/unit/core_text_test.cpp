@@ -1,7 +1,7 @@
 // Names from files in messages: short, on one line, and nothing in them that a terminal obeys.
-#include <dermis/text.h>
 #include <dermis/validate.h>
 #include <gtest/gtest.h>
+#include "core/text.h"
 
 #include <string>
 

@@ -1,6 +1,6 @@
 // How much memory a file may take: 64 MiB and 64 times the bytes of all its files, each counted
 // once. What would be more is refused before it is made.
-#include <dermis/memory_budget.h>
+#include "gltf/memory_budget.h"
 
 #include <cstddef>
 #include <filesystem>
@@ -84,8 +84,8 @@ TEST_F(GltfBudget, ReadsAndCountsAFileThatManyBuffersNameOnce) {
   file.json["buffers"][8]["byteLength"] = 1000;
   const gltf::Model model = loaded(file.load(folder_));
   const std::uint64_t all = allowed(file.text().size() + size);
-  EXPECT_LE(model.budget.left(), all) << "its bytes raise the budget once";
-  EXPECT_GE(model.budget.left(), all - 3 * size) << "and are spent once";
+  EXPECT_LE(model.memoryLeft, all) << "its bytes raise the budget once";
+  EXPECT_GE(model.memoryLeft, all - 3 * size) << "and are spent once";
 }
 
 TEST_F(GltfBudget, ReadsASideFileAsFarAsItIsNeeded) {
@@ -93,7 +93,7 @@ TEST_F(GltfBudget, ReadsASideFileAsFarAsItIsNeeded) {
   if (writeSparse("side.bin", "", std::uint64_t{100} << 30).empty()) GTEST_SKIP() << "not sparse";
   file.json["buffers"] = sideBuffers(1, file.binary.size(), "side.bin");
   const gltf::Model model = loaded(file.load(folder_));
-  EXPECT_LE(model.budget.left(), allowed(file.text().size() + file.binary.size()));
+  EXPECT_LE(model.memoryLeft, allowed(file.text().size() + file.binary.size()));
   file.json["buffers"] = sideBuffers(1, std::uint64_t{100} << 30, "side.bin");
   expectError(file.load(folder_), ErrorCode::limitExceeded,
               "buffer 0: the file has 107374182400 bytes");
@@ -118,7 +118,7 @@ TEST_F(GltfBudget, LooksAtTheHeaderBeforeItReadsTheRest) {
 // The text of a data URI stands in the file already: what it decodes to raises nothing.
 TEST_F(GltfBudget, DataUrisAreNotCountedTwice) {
   const FileBuilder file = skinnedTriangle();
-  EXPECT_LT(loaded(file.load()).budget.left(), allowed(file.text().size()));
+  EXPECT_LT(loaded(file.load()).memoryLeft, allowed(file.text().size()));
 }
 
 /// A triangle without data for its accessors; `nodes` nodes of a mesh of `primitives` primitives.
@@ -158,11 +158,11 @@ FileBuilder ofManyVertices(std::size_t count, bool isShared) {
 }
 
 TEST_F(GltfBudget, SpendsSharedAccessorsOnce) {
-  const std::uint64_t one = loaded(ofManyVertices(1, true)).budget.left();
+  const std::uint64_t one = loaded(ofManyVertices(1, true)).memoryLeft;
   const FileBuilder file = ofManyVertices(200, true);
   const gltf::Model model = loaded(file);
   EXPECT_EQ(model.skinnedPrimitives.size(), 200u);
-  EXPECT_GT(model.budget.left(), one - 200 * 1000);
+  EXPECT_GT(model.memoryLeft, one - 200 * 1000);
   expectError(ofManyVertices(200, false).load(), ErrorCode::limitExceeded,
               "it needs more memory than");
 }
@@ -205,8 +205,8 @@ TEST_F(GltfBudget, AnImageMayBeLargerThanTheBufferInItsFile) {
       loaded(gltf::loadFromMemory(bytesOf(file.text()), folder_, {.images = true}));
   EXPECT_EQ(model.images.at(0).bytes.size(), size);
   const std::uint64_t all = allowed(file.text().size() + size);
-  EXPECT_LE(model.budget.left(), all) << "the first half raises the budget once";
-  EXPECT_GE(model.budget.left(), all - 4 * size);
+  EXPECT_LE(model.memoryLeft, all) << "the first half raises the budget once";
+  EXPECT_GE(model.memoryLeft, all - 4 * size);
 }
 
 TEST_F(GltfBudget, EqualImagesAreOne) {

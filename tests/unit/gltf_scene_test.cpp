@@ -300,7 +300,7 @@ TEST(GltfRigidMesh, CountsAgainstTheBudget) {
   const Json hat = {
       {"attributes", {{"POSITION", file.addFloats(std::vector<float>(3 * vertices), "VEC3")}}}};
   const auto spent = [&] {
-    return loaded(file).budget.left() - loadedWithRigidMeshes(file).budget.left();
+    return loaded(file).memoryLeft - loadedWithRigidMeshes(file).memoryLeft;
   };
   file.json["meshes"][1]["primitives"] = Json::array({hat});
   const std::uint64_t withOne = spent();

@@ -11,7 +11,6 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
-#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "dermis/version.h"

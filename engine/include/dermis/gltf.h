@@ -3,8 +3,8 @@
 // If a file breaks a rule of the specification, a message names the accessor, node or skin at
 // fault. If the meaning is still clear (for example a byteStride that is not allowed), the file is
 // used and the message is a note. Otherwise the message is an error. A damaged or hostile file can
-// cause an error, but never a crash, a hang, or more memory than its size justifies
-// (memory_budget.h).
+// cause an error, but never a crash, a hang, or more memory than its size justifies: 64 MiB, plus
+// 64 times the bytes that are read from the file and from the files that it names.
 //
 // Threads: any thread may call any function. Many threads may read a `Model` at the same time, if
 // none changes it.
@@ -23,7 +23,6 @@
 #include <vector>
 
 #include "dermis/export.h"
-#include "dermis/memory_budget.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 #include "dermis/types.h"
@@ -150,8 +149,8 @@ struct Influences {
 /// file, so they may be NaN, and joint indices may be outside the skin: `validate` checks both.
 struct Primitive {
   /// For messages, which put it in quotes: "Fox" if its mesh has no other primitive, otherwise "Fox
-  /// primitive 1". "number 3" instead of "Fox" if mesh 3 has no name. Short, and on one line
-  /// (text.h).
+  /// primitive 1". "number 3" instead of "Fox" if mesh 3 has no name. Short, on one line,
+  /// and without characters that a terminal interprets.
   std::string name;
   std::uint32_t vertexCount = 0;
   SharedArray<float> positions;               ///< 3 per vertex
@@ -257,9 +256,9 @@ struct Model {
   /// The other files that were read, with links resolved. A program that writes must not overwrite
   /// them.
   std::vector<std::filesystem::path> sideFiles;
-  /// The memory that the file may still make the program use. Spend it before you allocate
+  /// Bytes that the file may still make the program use. Subtract from them before you allocate
   /// something for each node, primitive or skin, or the pixels of an image.
-  MemoryBudget budget;
+  std::uint64_t memoryLeft = 0;
 };
 
 /// What `load` reads and accepts.
@@ -297,8 +296,8 @@ struct LoadOptions {
 /// not
 ///   decode (`DERMIS_MESHOPTIMIZER`, `DERMIS_DRACO`), or is glTF 1.0;
 /// - `limitExceeded` if more than 4 GiB of a file are needed, if a skin has more than
-///   `maxPoseJoints` joints, if the model needs more memory than the files' sizes justify
-///   (memory_budget.h), or if there is not enough memory.
+///   `maxPoseJoints` joints, if the model needs more memory than the files' sizes justify, or if
+///   there is not enough memory.
 DERMIS_GLTF_API Result<Model> load(const std::filesystem::path& path,
                                    const LoadOptions& options = {});
 

@@ -1,4 +1,4 @@
-#include "dermis/text.h"
+#include "text.h"
 
 #include <array>
 #include <cstddef>

@@ -8,9 +8,9 @@
 #include <tuple>
 
 #include "attribute.h"
-#include "dermis/text.h"
 #include "dermis/types.h"
 #include "strict_floating_point.h"
+#include "text.h"
 
 namespace dermis {
 namespace {

@@ -204,8 +204,9 @@ class ClipMatcher {
 
 Result<std::vector<std::string>> addClips(Model& model, Model from) {
   if (from.clips.empty()) return Error{ErrorCode::invalidData, "it has no animations"};
-  if (!from.budget.spend(model.nodes.size(), ClipMatcher::bytesPerNode) ||
-      !from.budget.spend(from.nodes.size(), ClipMatcher::bytesPerSource)) {
+  MemoryBudget budget(from.memoryLeft);
+  if (!budget.spend(model.nodes.size(), ClipMatcher::bytesPerNode) ||
+      !budget.spend(from.nodes.size(), ClipMatcher::bytesPerSource)) {
     return Error{ErrorCode::limitExceeded,
                  "matching its nodes with those of the model needs more memory than the limit for "
                  "a file of this size"};

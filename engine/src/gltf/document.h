@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/memory_budget.h"
+#include "gltf/memory_budget.h"
 #include "gltf/tinygltf.h"
 
 namespace dermis::gltf {

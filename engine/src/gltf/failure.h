@@ -8,9 +8,9 @@
 #include <string_view>
 #include <utility>
 
-#include "dermis/memory_budget.h"
+#include "core/text.h"
 #include "dermis/result.h"
-#include "dermis/text.h"
+#include "gltf/memory_budget.h"
 
 namespace dermis::gltf {
 

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "dermis/memory_budget.h"
+#include "gltf/memory_budget.h"
 
 namespace dermis::gltf {
 

@@ -67,8 +67,9 @@ TextureUse textureOf(const json& root, const json& material) {
 /// Reads each image when it is first requested.
 class ImageReader {
  public:
-  ImageReader(const Appearance& appearance, const Source& source, SideFiles& files, Model& model)
-      : appearance_(appearance), source_(source), files_(files), model_(model) {
+  ImageReader(const Appearance& appearance, const Source& source, SideFiles& files,
+              MemoryBudget& budget, Model& model)
+      : appearance_(appearance), source_(source), files_(files), budget_(budget), model_(model) {
     model.images.resize(appearance.images.size());
     same_.resize(model.images.size());
   }
@@ -111,23 +112,24 @@ class ImageReader {
   std::vector<std::byte> bytesOf(const ImageDescription& image, const std::string& where) {
     if (image.bufferView) {
       const std::span<const std::byte> view = source_.viewBytes(*image.bufferView, where);
-      spend(model_.budget, view.size(), 1, where);
+      spend(budget_, view.size(), 1, where);
       return {view.begin(), view.end()};
     }
     if (!image.uri) failInvalid(where, ": it has neither a uri nor a bufferView");
     if (isDataUri(*image.uri)) {
-      spend(model_.budget, image.uri->size(), 2, where);
+      spend(budget_, image.uri->size(), 2, where);
       return decodeDataUri(*image.uri, where);
     }
     const FileToRead file = files_.find(*image.uri, where);
     const Bytes bytes = files_.read(file, file.size, where);
-    spend(model_.budget, bytes->size(), 1, where);
+    spend(budget_, bytes->size(), 1, where);
     return *bytes;
   }
 
   const Appearance& appearance_;
   const Source& source_;
   SideFiles& files_;
+  MemoryBudget& budget_;
   Model& model_;
   std::vector<std::optional<std::uint32_t>> same_;  // results of `find`
   std::map<std::uint64_t, std::uint32_t> byView_;
@@ -153,8 +155,8 @@ Appearance findAppearance(const json& root, MemoryBudget& budget) {
 }
 
 void readImages(const Appearance& appearance, const Source& source, SideFiles& files,
-                Model& model) {
-  ImageReader images(appearance, source, files, model);
+                MemoryBudget& budget, Model& model) {
+  ImageReader images(appearance, source, files, budget, model);
   for (std::size_t i = 0; i < model.materials.size(); ++i) {
     TextureUse use = appearance.baseColorTextures[i];
     use.image = images.find(use.image);

@@ -33,6 +33,7 @@ Appearance findAppearance(const nlohmann::json& root, MemoryBudget& budget);
 /// Fills in `images` and the textures of the materials. Only images that a material shows are read;
 /// equal ones are kept once. Side files are read by the same rules as those of buffers. An image
 /// that cannot be read gives a note.
-void readImages(const Appearance& appearance, const Source& source, SideFiles& files, Model& model);
+void readImages(const Appearance& appearance, const Source& source, SideFiles& files,
+                MemoryBudget& budget, Model& model);
 
 }  // namespace dermis::gltf

@@ -20,18 +20,18 @@ namespace {
 Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& folder,
                 const LoadOptions& options) {
   Model model;
-  model.budget.addFile(bytes.size());
-  spend(model.budget, bytes.size(), 1, "the file");
+  MemoryBudget budget;
+  budget.addFile(bytes.size());
+  spend(budget, bytes.size(), 1, "the file");
   Notes notes(options.strict);
   const Container container = openContainer(bytes, notes);
   Appearance appearance;
   Document document =
-      parseDocument(container.json, model.budget, notes, options.images ? &appearance : nullptr);
-  SideFiles files(folder, model.budget);
-  std::vector<Buffer> buffers =
-      loadBuffers(document, container.binaryChunk, files, model.budget, notes);
-  decodeViews(document, buffers, model.budget, notes);
-  Source source(std::move(document), std::move(buffers), model.budget, notes);
+      parseDocument(container.json, budget, notes, options.images ? &appearance : nullptr);
+  SideFiles files(folder, budget);
+  std::vector<Buffer> buffers = loadBuffers(document, container.binaryChunk, files, budget, notes);
+  decodeViews(document, buffers, budget, notes);
+  Source source(std::move(document), std::move(buffers), budget, notes);
 
   readNodes(source, model);
   readSkins(source, model);
@@ -39,8 +39,9 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   const std::vector<bool> faultyMeshes = checkPrimitives(source);
   readScene(source, faultyMeshes, options.rigidMeshes, model);
   readAnimations(source, model);
-  if (options.images) readImages(appearance, source, files, model);
+  if (options.images) readImages(appearance, source, files, budget, model);
   model.sideFiles = files.paths();
+  model.memoryLeft = budget.left();
   notes.appendTo(model.notes);
   return model;
 }

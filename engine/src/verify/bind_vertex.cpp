@@ -10,7 +10,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "dermis/text.h"
+#include "core/text.h"
 #include "strict_floating_point.h"
 
 namespace dermis::reference {

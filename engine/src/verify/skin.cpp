@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/text.h"
+#include "core/text.h"
 #include "dermis/validate.h"
 #include "strict_floating_point.h"
 #include "verify/bind_vertex.h"

@@ -56,7 +56,7 @@ gltf::TextureUse Appearances::textureUse(const gltf::Primitive& primitive) const
 Result<std::uint32_t> Appearances::decode(std::uint32_t index,
                                           const render::TextureOptions& options) {
   const gltf::Image& image = model_->images[index];
-  const Result<render::TexturePixels> pixels = render::decodeImage(image.bytes, &budget_);
+  const Result<render::TexturePixels> pixels = render::decodeImage(image.bytes, &memoryLeft_);
   if (!pixels) {
     notes_.push_back(image.name + ": " + pixels.error().message + "; the texture is ignored");
     return 0u;

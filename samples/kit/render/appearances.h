@@ -16,7 +16,7 @@ class Appearances {
  public:
   /// The arguments must outlive this object.
   Appearances(Device& device, render::Renderer& renderer, const gltf::Model& model)
-      : device_(&device), renderer_(&renderer), model_(&model), budget_(model.budget) {}
+      : device_(&device), renderer_(&renderer), model_(&model), memoryLeft_(model.memoryLeft) {}
 
   /// Ignores a texture, and adds a note, if it cannot be decoded or if its pixels need more memory
   /// than the model's file justifies. Fails with `vulkanError`.
@@ -35,7 +35,7 @@ class Appearances {
   Device* device_;
   render::Renderer* renderer_;
   const gltf::Model* model_;
-  gltf::MemoryBudget budget_;  ///< for pixels
+  std::uint64_t memoryLeft_;  ///< for pixels
   std::map<const gltf::Primitive*, render::Geometry> geometries_;
   /// Textures of the renderer, by image and wrap modes; 0 for an ignored texture.
   std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "kit/buffer.h"
+#include "kit/memory_left.h"
 #include "kit/render/stb_headers.h"
 
 namespace dermis::samples::render {
@@ -214,7 +215,7 @@ Result<void> upload(Device& device, const TexturePixels& pixels, const Image& im
 
 }  // namespace
 
-Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, gltf::MemoryBudget* budget) {
+Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, std::uint64_t* memoryLeft) {
   const auto* bytes = reinterpret_cast<const stbi_uc*>(encoded.data());
   const Error broken{ErrorCode::invalidData, "it is not a valid PNG or JPEG"};
   if (encoded.empty() || !std::in_range<int>(encoded.size())) return broken;
@@ -228,7 +229,7 @@ Result<TexturePixels> decodeImage(std::span<const std::byte> encoded, gltf::Memo
   }
   const auto pixels =
       std::uint64_t{4} * static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height);
-  if (budget != nullptr && !budget->spend(pixels)) {
+  if (memoryLeft != nullptr && !spend(*memoryLeft, pixels)) {
     return Error{ErrorCode::limitExceeded,
                  "its " + std::to_string(width) + " x " + std::to_string(height) +
                      " pixels take more memory than the limit for a file of this size"};

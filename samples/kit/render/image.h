@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "dermis/memory_budget.h"
 #include "kit/render/owned.h"
 
 namespace dermis::samples::render {
@@ -67,10 +66,10 @@ struct TextureOptions {
 };
 
 /// Decodes a PNG or JPEG. Fails with `invalidData` if it is broken or has another format, and with
-/// `limitExceeded` if it is larger than 8192 pixels on a side, or than the budget if there is one.
-/// This is checked before memory is allocated.
+/// `limitExceeded` if it is larger than 8192 pixels on a side, or needs more memory than
+/// `memoryLeft`. This is checked before memory is allocated.
 Result<TexturePixels> decodeImage(std::span<const std::byte> encoded,
-                                  gltf::MemoryBudget* budget = nullptr);
+                                  std::uint64_t* memoryLeft = nullptr);
 
 class Texture {
  public:

@@ -10,8 +10,8 @@
 #include <imgui.h>
 #include <glm/vec4.hpp>
 
-#include "dermis/text.h"
 #include "kit/render/draw.h"
+#include "kit/text.h"
 
 namespace dermis::viewer {
 namespace {
@@ -157,7 +157,7 @@ void drawClip(const SceneView& view, State& state) {
   const auto name = [&](std::uint32_t index) {
     if (index >= count) return std::string("rest pose");
     const std::string& own = clips[index].name;
-    return own.empty() ? fmt::format("clip {}", index) : shortName(own);
+    return own.empty() ? fmt::format("clip {}", index) : samples::shortName(own);
   };
   if (const auto clip = choose("##clip", count + 1, std::min(state.shot.clip, count), name); clip)
     chooseClip(*clip < count ? *clip : gltf::none, state);

@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "dermis/text.h"
 #include "dermis/verify/reference.h"
+#include "kit/text.h"
 #include "vulkan_helpers.h"
 
 namespace dermis::viewer {
@@ -42,7 +42,7 @@ std::vector<Joint> jointsOf(const cli::Scene& scene) {
     for (const std::uint32_t node : model.skins[part.source.skin].joints) {
       if (place[node] != gltf::none) continue;
       place[node] = static_cast<std::uint32_t>(joints.size());
-      std::string name = shortName(model.nodes[node].name);
+      std::string name = samples::shortName(model.nodes[node].name);
       if (name.empty()) name = "node " + std::to_string(node);
       joints.push_back({std::move(name), node, gltf::none});
     }

@@ -12,9 +12,9 @@
 #include "attribute.h"
 #include "bounds/extent.h"
 #include "dermis/bounds.h"
-#include "dermis/text.h"
 #include "dermis/validate.h"
 #include "strict_floating_point.h"
+#include "text.h"
 
 namespace dermis {
 namespace {

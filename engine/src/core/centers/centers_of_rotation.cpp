@@ -16,12 +16,12 @@
 #include "attribute.h"
 #include "centers/pair_index.h"
 #include "dermis/mesh.h"
-#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "linear_algebra.h"
 #include "pack/influences.h"
 #include "strict_floating_point.h"
+#include "text.h"
 
 namespace dermis::centers {
 namespace {

@@ -8,12 +8,12 @@
 
 #include "abi.h"
 #include "attribute.h"
-#include "dermis/text.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "pack/check.h"
 #include "pack/influences.h"
 #include "strict_floating_point.h"
+#include "text.h"
 
 namespace dermis {
 namespace {

@@ -7,12 +7,14 @@
 namespace dermis::gltf {
 
 /// 64 MiB, plus 64 times the bytes that are read from the file and from the files that it names.
-/// `load` calls `spend` before each allocation; the caller does so for what it makes from the
-/// model. Nothing is given back, so the budget limits the time that a file takes, too.
+/// `load` calls `spend` before each allocation. Nothing is given back, so the budget limits the
+/// time that a file takes, too.
 class MemoryBudget {
  public:
   static constexpr std::uint64_t base = std::uint64_t{64} << 20;  ///< bytes without any file
   static constexpr std::uint64_t perByte = 64;                    ///< bytes for each byte of a file
+
+  explicit MemoryBudget(std::uint64_t left = base) : left_(left) {}
 
   /// Adds the budget for a file of `bytes` bytes. Call it once for each file.
   void addFile(std::uint64_t bytes) { left_ += saturated(bytes, perByte); }
@@ -36,7 +38,7 @@ class MemoryBudget {
     return b != 0 && a > most / b ? most : a * b;
   }
 
-  std::uint64_t left_ = base;
+  std::uint64_t left_;
 };
 
 }  // namespace dermis::gltf
