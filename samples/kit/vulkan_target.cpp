@@ -115,13 +115,12 @@ Result<BatchResult> VulkanRunner::skin() {
   result.dispatches = plan.dispatchCount();
   for (std::uint32_t index = 0; index < layout_.jobs.size(); ++index) {
     SkinnedVertices& skinned = result.instances.emplace_back();
-    const std::uint64_t status = plan.statusOffset(layout_.jobs[index].pose);
     PoseStatus& known = skinned.status.emplace();
-    if (status != Plan::noStatus)
-      std::memcpy(&known, buffers->palettes.bytes().data() + status, sizeof(known));
-    const std::uint64_t place = plan.resultOffset(index);
-    if (place != Plan::noResult) {
-      std::memcpy(&skinned.result, buffers->results.bytes().data() + place, sizeof(skinned.result));
+    if (const auto status = plan.statusOffset(layout_.jobs[index].pose))
+      std::memcpy(&known, buffers->palettes.bytes().data() + *status, sizeof(known));
+    if (const auto place = plan.resultOffset(index)) {
+      std::memcpy(&skinned.result, buffers->results.bytes().data() + *place,
+                  sizeof(skinned.result));
     }
   }
   return result;

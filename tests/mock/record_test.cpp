@@ -15,6 +15,7 @@
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
+#include "plan/placement.h"
 #include "plan_commands.h"
 
 namespace dermis::test {

@@ -62,7 +62,7 @@ TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
   ASSERT_EQ(dispatchesOf(out).size(), 1u);
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 0u);
   for (std::uint32_t palette = 0; palette < 4; ++palette) {
-    EXPECT_EQ(out.statusOffset(palette), Plan::noStatus);
+    EXPECT_EQ(out.statusOffset(palette), std::nullopt);
   }
 }
 
@@ -73,10 +73,10 @@ TEST(Plan, PosesThatNoDualQuaternionJobUsesAreLeftOut) {
   batch.addJob(0, 1, Method::dualQuaternion, true);
   batch.addJob(0, 1, Method::dualQuaternion, true);
   const Plan out = planned(batch);
-  EXPECT_EQ(out.statusOffset(0), Plan::noStatus);
-  EXPECT_EQ(out.statusOffset(2), Plan::noStatus);
-  EXPECT_EQ(out.statusOffset(4), Plan::noStatus);  // there is none
-  EXPECT_NE(out.statusOffset(1), Plan::noStatus);
+  EXPECT_EQ(out.statusOffset(0), std::nullopt);
+  EXPECT_EQ(out.statusOffset(2), std::nullopt);
+  EXPECT_EQ(out.statusOffset(4), std::nullopt);  // there is none
+  EXPECT_NE(out.statusOffset(1), std::nullopt);
   EXPECT_NE(out.statusOffset(3), out.statusOffset(1));
   // 9 joints that may scale, 7 joints that may: 64 bytes each, and a status of 16.
   EXPECT_EQ(out.buffer(BufferRole::palettes).size, 16 + 9 * 64 + 16 + 7 * 64u);
@@ -126,12 +126,13 @@ TEST(Plan, APoseInTwoFormsHasAStatusInEither) {
   EXPECT_EQ(palettes, 4u);
   std::set<std::uint64_t> offsets;
   for (const std::uint32_t palette : {0u, 1u, 2u}) {
-    EXPECT_LT(out.statusOffset(palette), out.buffer(BufferRole::palettes).size);
-    EXPECT_EQ(out.statusOffset(palette) % 16, 0u);
-    offsets.insert(out.statusOffset(palette));
+    const std::uint64_t offset = out.statusOffset(palette).value();
+    EXPECT_LT(offset, out.buffer(BufferRole::palettes).size);
+    EXPECT_EQ(offset % 16, 0u);
+    offsets.insert(offset);
   }
   EXPECT_EQ(offsets.size(), 3u);
-  EXPECT_EQ(out.statusOffset(3), Plan::noStatus);
+  EXPECT_EQ(out.statusOffset(3), std::nullopt);
 }
 
 // A mesh runs in the kernel for its own influences, whatever else is in the batch.
@@ -282,10 +283,10 @@ TEST_F(PlanFeatures, ResultsStandInTheOrderOfTheirJobsWithoutGaps) {
   snorm.box = {{0, 0, 0}, {1, 1, 1}};
   for (const Job& job : {plain, snorm, bounded, plain, bounded, snorm}) add(job);
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
-  EXPECT_EQ(out.resultOffset(0), Plan::noResult);
+  EXPECT_EQ(out.resultOffset(0), std::nullopt);
   EXPECT_EQ(out.resultOffset(1), 0u);
   EXPECT_EQ(out.resultOffset(2), 32u);
-  EXPECT_EQ(out.resultOffset(3), Plan::noResult);
+  EXPECT_EQ(out.resultOffset(3), std::nullopt);
   EXPECT_EQ(out.resultOffset(4), 64u);
   EXPECT_EQ(out.resultOffset(5), 96u);
   EXPECT_EQ(out.buffer(BufferRole::results).size, 128u);

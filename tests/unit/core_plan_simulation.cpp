@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "abi.h"
+#include "plan/placement.h"
 #include "plan_commands.h"
 #include "random_rig.h"
 
@@ -89,11 +90,11 @@ class Simulation {
     std::uint64_t next = 0;
     for (std::uint32_t index = 0; index < batch_.jobs.size(); ++index) {
       const bool wanted = wantsResult(batch_.jobs[index]);
-      ASSERT_EQ(plan_.resultOffset(index), wanted ? next : Plan::noResult) << index;
+      ASSERT_EQ(plan_.resultOffset(index), wanted ? std::optional(next) : std::nullopt) << index;
       if (wanted) next += sizeof(InstanceResult);
     }
     ASSERT_EQ(plan_.buffer(BufferRole::results).size, next);
-    ASSERT_EQ(plan_.resultOffset(static_cast<std::uint32_t>(batch_.jobs.size())), Plan::noResult);
+    ASSERT_EQ(plan_.resultOffset(static_cast<std::uint32_t>(batch_.jobs.size())), std::nullopt);
   }
 
   void checkAllWritten() {
@@ -195,10 +196,10 @@ class Simulation {
   /// What a plan says of a status is true of one that is written.
   void checkStatuses() {
     for (std::uint32_t palette = 0; palette < batch_.poses.size(); ++palette) {
-      const std::uint64_t status = plan_.statusOffset(palette);
+      const std::optional<std::uint64_t> status = plan_.statusOffset(palette);
       const auto dual = statuses_.find({palette, false}),
                  logarithm = statuses_.find({palette, true});
-      if (status == Plan::noStatus) {
+      if (!status) {
         ASSERT_TRUE(dual == statuses_.end() && logarithm == statuses_.end()) << palette;
       } else {
         ASSERT_TRUE((dual != statuses_.end() && dual->second == status) ||
@@ -731,8 +732,8 @@ void expectEmpty(const Plan& plan) {
   EXPECT_EQ(plan.vertexCount(), 0u);
   for (const BufferRole role : {BufferRole::tables, BufferRole::palettes, BufferRole::results})
     EXPECT_EQ(plan.buffer(role).size, 0u);
-  EXPECT_EQ(plan.statusOffset(0), Plan::noStatus);
-  EXPECT_EQ(plan.resultOffset(0), Plan::noResult);
+  EXPECT_EQ(plan.statusOffset(0), std::nullopt);
+  EXPECT_EQ(plan.resultOffset(0), std::nullopt);
 }
 
 void expectPlanned(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,

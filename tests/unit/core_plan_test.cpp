@@ -32,27 +32,19 @@ TEST(Plan, BuffersAreDescribed) {
     BufferRole role;
     std::uint64_t size;
     std::uint32_t usage;
-    bool perFrame, hostWritten;
-  } expected[] = {
-      {BufferRole::meshes, batch.meshesSize, storage | transferTarget, false, true},
-      {BufferRole::poses, batch.posesSize, storage, true, true},
-      {BufferRole::positions, batch.separateSizes[0], storage, false, false},
-      {BufferRole::normals, batch.separateSizes[1], storage, false, false},
-      {BufferRole::tangents, batch.separateSizes[2], storage, false, false},
-      {BufferRole::previousPositions, batch.separateSizes[3], storage, false, false},
-      {BufferRole::results, out.buffer(BufferRole::results).size, storage, true, false}};
-  for (const auto& [role, size, usage, perFrame, hostWritten] : expected) {
+  } expected[] = {{BufferRole::meshes, batch.meshesSize, storage | transferTarget},
+                  {BufferRole::poses, batch.posesSize, storage},
+                  {BufferRole::positions, batch.separateSizes[0], storage},
+                  {BufferRole::normals, batch.separateSizes[1], storage},
+                  {BufferRole::tangents, batch.separateSizes[2], storage},
+                  {BufferRole::previousPositions, batch.separateSizes[3], storage},
+                  {BufferRole::results, out.buffer(BufferRole::results).size, storage}};
+  for (const auto& [role, size, usage] : expected) {
     const BufferRequirement buffer = out.buffer(role);
     EXPECT_EQ(buffer.size, size);
     EXPECT_EQ(buffer.alignment, 64u);
     EXPECT_EQ(buffer.usage & usage, usage);
-    EXPECT_EQ(buffer.perFrame, perFrame);
-    EXPECT_EQ(buffer.hostWritten, hostWritten);
   }
-  EXPECT_TRUE(out.buffer(BufferRole::tables).perFrame);
-  EXPECT_TRUE(out.buffer(BufferRole::tables).hostWritten);
-  EXPECT_TRUE(out.buffer(BufferRole::palettes).perFrame);
-  EXPECT_FALSE(out.buffer(BufferRole::palettes).hostWritten);
   EXPECT_EQ(out.buffer(BufferRole::palettes).usage & storage, storage);
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core_plan_simulation.h"
+#include "plan/placement.h"
 #include "plan_commands.h"
 
 namespace dermis::test {

@@ -281,7 +281,8 @@ DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& n
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
-/// The buffers of a batch or a scene.
+/// The buffers of a batch or a scene. Poses, tables, palettes and results of a batch, and `upload`
+/// and `readBack` of a scene, are rewritten in every frame: each frame in flight needs its own.
 enum class BufferRole : std::uint8_t {
   meshes,  ///< packed meshes
   poses,   ///< joint matrices; in a scene, those that the CPU writes
@@ -311,8 +312,6 @@ struct BufferRequirement {
   /// Minimum VkBufferUsageFlags. The engine adds its own, for example VERTEX_BUFFER for outputs, or
   /// TRANSFER_SRC to copy results.
   std::uint32_t usage = 0;
-  bool perFrame = false;     ///< rewritten every frame: one copy for each frame in flight
-  bool hostWritten = false;  ///< written by the CPU: mapped, or copied to before `record`
 };
 
 /// The part of an output buffer that a dispatch writes: bind min(buffer size - `offset`,
@@ -385,11 +384,6 @@ struct BarrierCommand {
 /// One command of a plan.
 using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, BarrierCommand>;
 
-/// Bytes from the beginning of one output window to the beginning of the next. A window has at most
-/// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
-/// instance, lies in one window.
-DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
-
 /// What the palette kernel reports about one pose, in the palettes buffer, at `Plan::statusOffset`.
 /// The engine may copy it from there.
 struct PoseStatus {
@@ -426,15 +420,12 @@ class DERMIS_CORE_API Plan {
   /// as `Scene::buffer`, but tables and upload have the size that this plan needs. Visibility,
   /// history and counters have size 0 if the plan culls no instance on the GPU.
   BufferRequirement buffer(BufferRole role) const;
-  /// Byte offset of a pose's `PoseStatus` in the palettes buffer. `noStatus` if the pose is not
+  /// Byte offset of a pose's `PoseStatus` in the palettes buffer. Empty if the pose is not
   /// converted, and for the plan of a scene.
-  std::uint64_t statusOffset(std::uint32_t pose) const;
-  static constexpr std::uint64_t noStatus = ~std::uint64_t{0};
-  /// Byte offset of a job's `InstanceResult` in the results buffer. `noResult` if the job has none,
-  /// and for the plan of a scene.
-  /// Results are in the order of their jobs, without gaps.
-  std::uint64_t resultOffset(std::uint32_t job) const;
-  static constexpr std::uint64_t noResult = ~std::uint64_t{0};
+  std::optional<std::uint64_t> statusOffset(std::uint32_t pose) const;
+  /// Byte offset of a job's `InstanceResult` in the results buffer. Empty if the job has none, and
+  /// for the plan of a scene. Results are in the order of their jobs, without gaps.
+  std::optional<std::uint64_t> resultOffset(std::uint32_t job) const;
 
   /// The limits that the plan was made for.
   const DeviceLimits& limits() const;

@@ -7,9 +7,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "dermis/export.h"
 #include "dermis/plan.h"
 
 namespace dermis {
+
+/// Bytes from the beginning of one output window to the beginning of the next. A window has at most
+/// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
+/// instance, lies in one window.
+DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
 /// One attribute of a job's output; `size` 0 if it is not wanted.
 struct OutputStream {

@@ -61,16 +61,16 @@ std::uint64_t Plan::vertexCount() const {
   return data_->vertexCount;
 }
 
-std::uint64_t Plan::statusOffset(std::uint32_t palette) const {
+std::optional<std::uint64_t> Plan::statusOffset(std::uint32_t palette) const {
   // Each form has a status of its own, which says the same.
   for (const std::vector<std::uint32_t>& units : data_->paletteUnits) {
     if (palette < units.size() && units[palette] != notUsed) return units[palette] * unitBytes;
   }
-  return noStatus;
+  return std::nullopt;
 }
 
-std::uint64_t Plan::resultOffset(std::uint32_t job) const {
-  if (job >= data_->results.size() || data_->results[job] == notUsed) return noResult;
+std::optional<std::uint64_t> Plan::resultOffset(std::uint32_t job) const {
+  if (job >= data_->results.size() || data_->results[job] == notUsed) return std::nullopt;
   return data_->results[job] * std::uint64_t{sizeof(InstanceResult)};
 }
 
@@ -88,44 +88,42 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
   switch (role) {
     // What the host fills may be staged: written to another buffer, and copied.
     case BufferRole::meshes:
-      return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0), false, true};
+      return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0)};
     case BufferRole::poses:
       // In a scene the skin kernel reads palettes only, so poses need no texel buffer usage.
-      if (isScene) return {poses, alignment, storage, false, true};
-      return {poses, alignment, read | copiedTo, true, true};
+      if (isScene) return {poses, alignment, storage};
+      return {poses, alignment, read | copiedTo};
     case BufferRole::gpuPoses:
-      if (isScene) return {gpuPoses, alignment, storage, false, false};
+      if (isScene) return {gpuPoses, alignment, storage};
       break;
     case BufferRole::tables:
-      if (isScene) return {tables, alignment, read | copiedTo | indirect, false, false};
-      return {tables, alignment, read | copiedTo, true, true};
+      if (isScene) return {tables, alignment, read | copiedTo | indirect};
+      return {tables, alignment, read | copiedTo};
     case BufferRole::palettes:
-      return {palettes, alignment, read, !isScene, false};
+      return {palettes, alignment, read};
     case BufferRole::results:
-      return {resultBytes, alignment, written, !isScene, false};
+      return {resultBytes, alignment, written};
     case BufferRole::positions:
-      return {outputs.positions, isScene ? outputRangeAlignment(limits) : alignment, written, false,
-              false};
+      return {outputs.positions, isScene ? outputRangeAlignment(limits) : alignment, written};
     case BufferRole::normals:
-      return {outputs.normals, alignment, written, false, false};
+      return {outputs.normals, alignment, written};
     case BufferRole::tangents:
-      return {outputs.tangents, alignment, written, false, false};
+      return {outputs.tangents, alignment, written};
     case BufferRole::previousPositions:
-      return {outputs.previousPositions, alignment, written, false, false};
+      return {outputs.previousPositions, alignment, written};
     case BufferRole::upload:
-      if (isScene) return {tables, 4, copiedFrom, true, true};
+      if (isScene) return {tables, 4, copiedFrom};
       break;
     case BufferRole::readBack:
-      if (isScene) return {readBackResults + resultBytes, 4, copiedTo, true, false};
+      if (isScene) return {readBackResults + resultBytes, 4, copiedTo};
       break;
     case BufferRole::visibility:
-      return {slots * std::uint64_t{4}, alignment, storage, false, false};
+      return {slots * std::uint64_t{4}, alignment, storage};
     case BufferRole::history:
-      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, written, false, false};
+      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, written};
     case BufferRole::counters:
       if (slots != 0)
-        return {sizeof(abi::CounterRecord), alignment, storage | copiedTo | copiedFrom, false,
-                false};
+        return {sizeof(abi::CounterRecord), alignment, storage | copiedTo | copiedFrom};
       break;
   }
   return {};

@@ -202,7 +202,8 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   std::vector<std::byte> tables(plan.buffer(BufferRole::tables).size);
   if (Result<void> done = writeTables(plan, tables); !done) return done;
   std::printf("%u dispatches of %zu variants, results at %llu\n", plan.dispatchCount(),
-              plan.variants().size(), static_cast<unsigned long long>(plan.resultOffset(1)));
+              plan.variants().size(),
+              static_cast<unsigned long long>(plan.resultOffset(1).value()));
   print("tables", hashOf(tables));
 
   // What an engine prepares that knows nothing but its vertex and the methods that it uses.
