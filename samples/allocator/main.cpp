@@ -190,6 +190,7 @@ int main() {
   device.physicalDevice = engine.physicalDevice;
   device.device = engine.device;
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
+  device.apiVersion = VK_API_VERSION_1_1;
   vulkan::Context context = must(vulkan::Context::create(device));
 
   // -- Dermis: its output is a range of the vertex buffer that the engine uses for everything.

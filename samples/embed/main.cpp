@@ -192,12 +192,13 @@ int main() {
   mesh.influenceSets = {&influences, 1};
 
   // [set-up]
-  // Lends the VkDevice to Dermis. Optional features that are enabled on it would be listed here.
+  // Lends the VkDevice to Dermis. Features and extensions enabled on it would be stated here.
   vulkan::DeviceDescription device;
   device.instance = engine.instance;
   device.physicalDevice = engine.physicalDevice;
   device.device = engine.device;
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
+  device.apiVersion = VK_API_VERSION_1_1;
   const vulkan::Context context = must(vulkan::Context::create(device));
   const auto packed = must(pack(mesh, jointCount));
   must(context.prepare(needs));

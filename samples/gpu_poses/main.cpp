@@ -235,6 +235,7 @@ int main() {
   device.physicalDevice = engine.physicalDevice;
   device.device = engine.device;
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
+  device.apiVersion = VK_API_VERSION_1_1;
   vulkan::Context context = must(vulkan::Context::create(device));
 
   // -- Dermis: while loading. The engine creates the buffer of the poses and passes it to Dermis.

@@ -147,6 +147,7 @@ int main() {
   device.physicalDevice = engine.physicalDevice;
   device.device = engine.device;
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
+  device.apiVersion = VK_API_VERSION_1_1;
   vulkan::Context context = must(vulkan::Context::create(device));
   vulkan::SkinningSystemDescription description;
   description.context = &context;

@@ -89,6 +89,8 @@ TEST(ContextTest, MissingHandlesAndOldVersionsAreRefused) {
   refuses([](Description& d) { d.device = VK_NULL_HANDLE; }, ErrorCode::invalidArgument, "device");
   refuses([](Description& d) { d.getInstanceProcAddr = nullptr; }, ErrorCode::invalidArgument,
           "getInstanceProcAddr");
+  refuses([](Description& d) { d.apiVersion = 0; }, ErrorCode::invalidArgument,
+          "state the lower of the API versions of instance and device");
   refuses([](Description& d) { d.apiVersion = VK_API_VERSION_1_0; }, ErrorCode::missingFeature,
           "Vulkan 1.1");
   mock.limits.maxPerStageDescriptorStorageBuffers = 3;

@@ -329,6 +329,7 @@ vulkan::DeviceDescription MockVulkan::description() const {
   description.physicalDevice = reinterpret_cast<VkPhysicalDevice>(std::uintptr_t{32});
   description.device = reinterpret_cast<VkDevice>(std::uintptr_t{48});
   description.getInstanceProcAddr = getInstanceProcAddr;
+  description.apiVersion = VK_API_VERSION_1_1;
   description.enabledExtensions = extensions;
   description.allocator = allocator;
   return description;

@@ -22,6 +22,11 @@ Result<void> checkDescription(const DeviceDescription& description) {
   if (description.physicalDevice == VK_NULL_HANDLE) return missingHandle("physicalDevice");
   if (description.device == VK_NULL_HANDLE) return missingHandle("device");
   if (description.getInstanceProcAddr == nullptr) return missingHandle("getInstanceProcAddr");
+  if (description.apiVersion == 0) {
+    return Error{ErrorCode::invalidArgument,
+                 "DeviceDescription::apiVersion is 0: state the lower of the API versions of "
+                 "instance and device, for example VK_API_VERSION_1_1"};
+  }
   if (description.apiVersion < VK_API_VERSION_1_1) {
     return Error{ErrorCode::missingFeature,
                  "Dermis needs Vulkan 1.1, but the engine enabled " +

@@ -5,7 +5,6 @@
 
 namespace dermis::vulkan {
 
-static_assert(apiVersion11 == VK_API_VERSION_1_1);
 static_assert(vertexBufferUsage == VK_BUFFER_USAGE_VERTEX_BUFFER_BIT);
 
 }  // namespace dermis::vulkan

@@ -26,8 +26,9 @@ struct DeviceDescription {
   /// vkGetInstanceProcAddr of the loader or of a layer. Dermis gets all other functions through it,
   /// and does not link the loader.
   PFN_vkGetInstanceProcAddr getInstanceProcAddr = nullptr;
-  /// The lower of the API versions of instance and device. Minimum: Vulkan 1.1.
-  std::uint32_t apiVersion = apiVersion11;
+  /// The lower of the API versions of instance and device, for example VK_API_VERSION_1_1, which is
+  /// the minimum. Required.
+  std::uint32_t apiVersion = 0;
   /// Names of the enabled device extensions. Dermis uses VK_KHR_push_descriptor if it is listed.
   /// The instance extension VK_EXT_debug_utils may be listed, too; Dermis then names its objects
   /// and labels its commands. Only `Context::create` reads the names.
@@ -72,7 +73,7 @@ class DERMIS_VULKAN_API Context {
  public:
   /// Gets entry points and limits, and creates layouts, but no shader modules or pipelines. Fails
   /// with
-  /// - `invalidArgument` if a required handle is null;
+  /// - `invalidArgument` if a required handle is null, or `apiVersion` is 0;
   /// - `missingEntryPoint` if the driver does not have a function;
   /// - `missingFeature` if the API version is below 1.1, or the device has fewer than four storage
   ///   buffers per stage;

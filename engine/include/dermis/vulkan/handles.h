@@ -41,7 +41,6 @@ using PFN_vkGetInstanceProcAddr = PFN_vkVoidFunction(VKAPI_PTR*)(VkInstance inst
 
 namespace dermis::vulkan {
 
-inline constexpr std::uint32_t apiVersion11 = 1u << 22 | 1u << 12;  ///< VK_API_VERSION_1_1
 inline constexpr VkBufferUsageFlags vertexBufferUsage =
     0x80;  ///< VK_BUFFER_USAGE_VERTEX_BUFFER_BIT
 

@@ -126,6 +126,7 @@ int main() {
   description.physicalDevice = reinterpret_cast<VkPhysicalDevice>(&anything);
   description.device = reinterpret_cast<VkDevice>(&anything);
   description.getInstanceProcAddr = knowsNothing;
+  description.apiVersion = VK_API_VERSION_1_1;
   if (!refuses(description, ErrorCode::missingEntryPoint)) return 4;
   return 0;
 }
