@@ -483,8 +483,8 @@ TEST_F(EnumValuesTest, NoEnumIsMissing) {
       "Method", "VertexFormat", "Motion", "Arrangement", "Kernel", "BufferRole", "PoseWriter",
       "ComponentType", "MeshProblem", "ErrorCode", "Use", "QueueTransfer", "ShaderStage",
       "Interpolation", "ChannelPath",
-      // No function reads one: an index of arrays, and what functions return.
-      "Stream", "Access", "BufferUse", "AlphaMode", "Wrap"};
+      // No function reads one: an index of arrays, bit masks, and what functions return.
+      "Stream", "Access", "DeviceFeature", "BufferUse", "AlphaMode", "Wrap"};
   std::set<std::string> found;
   const std::regex declaration("enum class (\\w+)");
   for (const auto& entry : std::filesystem::recursive_directory_iterator(

@@ -115,6 +115,25 @@ TEST_F(MockTexelTest, NeedScalarBlockLayoutFromOneOfItsStructuresAndIntegersOf64
   EXPECT_FALSE(has());
 }
 
+TEST_F(MockTexelTest, FeaturesMayBeStatedAsBitsAsAChainOrHalfAndHalf) {
+  using enum vulkan::DeviceFeature;
+  VkPhysicalDeviceFeatures2 integers{};
+  integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+  integers.features.shaderInt64 = VK_TRUE;
+  vulkan::DeviceDescription description = mock.description();
+  description.texelBuffers = true;
+  const auto has = [&](const void* chain, vulkan::DeviceFeature bits) {
+    description.enabledFeatures = chain;
+    description.enabledFeatureBits = bits;
+    return vulkan::Context::create(description)->limits().texelBuffers;
+  };
+  EXPECT_TRUE(has(nullptr, scalarBlockLayout | shaderInt64));
+  EXPECT_FALSE(has(nullptr, scalarBlockLayout));
+  EXPECT_FALSE(has(nullptr, shaderInt64));
+  EXPECT_FALSE(has(&integers, none));
+  EXPECT_TRUE(has(&integers, scalarBlockLayout)) << "both together";
+}
+
 TEST_F(MockTexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
   ASSERT_NO_FATAL_FAILURE(create(false, false));
   EXPECT_FALSE(context->limits().texelBuffers);

@@ -41,11 +41,13 @@ struct CpuDeviceFeatures {
   bool scalarBlockLayout = false, shaderInt64 = false;
 };
 
-/// Reads the features that Dermis uses from a pNext chain.
-CpuDeviceFeatures readFeatures(const void* chain) {
-  CpuDeviceFeatures features;
-  for (const auto* next = static_cast<const VkBaseInStructure*>(chain); next != nullptr;
-       next = next->pNext) {
+/// Reads the features that Dermis uses from the bits and the pNext chain.
+CpuDeviceFeatures readFeatures(const DeviceDescription& description) {
+  const DeviceFeature bits = description.enabledFeatureBits;
+  CpuDeviceFeatures features{includes(bits, DeviceFeature::scalarBlockLayout),
+                             includes(bits, DeviceFeature::shaderInt64)};
+  for (const auto* next = static_cast<const VkBaseInStructure*>(description.enabledFeatures);
+       next != nullptr; next = next->pNext) {
     switch (next->sType) {
       case VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES:
         features.scalarBlockLayout |=
@@ -158,7 +160,8 @@ Result<Context> Context::create(const DeviceDescription& description) {
   state.limits.maxStorageBuffersPerStage = properties.limits.maxPerStageDescriptorStorageBuffers;
   state.limits.separateRanges = state.pushesDescriptors();
   state.timestampPeriod = properties.limits.timestampPeriod;
-  const CpuDeviceFeatures features = readFeatures(description.enabledFeatures);
+  const CpuDeviceFeatures features = readFeatures(description);
+
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
   const DeviceDefaults defaults = defaultsOf(properties.deviceType);
   state.tuning = defaults.tuning;
