@@ -381,7 +381,7 @@ TEST_F(EnumValuesTest, ComponentTypesAreChecked) {
        {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.normals; }, directions},
        {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.tangents; }, directions},
        {[](MeshView&, InfluenceSet& set) -> AttributeView& { return set.joints; },
-        {uint8, uint16, uint32}},
+        {float32, uint8, uint16, uint32}},
        {[](MeshView&, InfluenceSet& set) -> AttributeView& { return set.weights; }, shares},
        {[](MeshView& view, InfluenceSet&) -> AttributeView& { return view.dualQuaternionWeights; },
         shares},

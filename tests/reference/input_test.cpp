@@ -97,6 +97,9 @@ TEST_F(InputTest, JointsOf16BitsWeightsOf16Bits) {
 TEST_F(InputTest, JointsOf32BitsWeightsInFloat) {
   expectFormat<std::uint32_t, float>(ComponentType::uint32, ComponentType::float32, 1.0 / 256);
 }
+TEST_F(InputTest, JointsInFloatWeightsOf8Bits) {
+  expectFormat<float, std::uint8_t>(ComponentType::float32, ComponentType::unorm8, 1);
+}
 
 TEST_F(InputTest, InfluencesMayBeSpreadOverSetsOfDifferentFormats) {
   // Slots 0 and 1 as unorm8 with 8-bit joints; 2 as unorm16; 3 as float: all parts of 255.

@@ -766,6 +766,10 @@ TEST(Bounds, ReadEveryStoredForm) {
   EXPECT_TRUE(bounds.joints[0].alone.empty());
   EXPECT_EQ(bounds.joints[1].alone.reach[0], 10);
   EXPECT_TRUE(bounds.trios.empty());
+  const std::array<float, 4> floats{1, 0, 0, 1};
+  const InfluenceSet ofFloats{floatAttribute(floats.data(), 2, 2), set.weights};
+  mesh.influenceSets = {&ofFloats, 1};
+  EXPECT_EQ(boundsOf(mesh, 2).bytes(), bounds.bytes());
 }
 
 // ---- As they are stored

@@ -198,6 +198,12 @@ TEST(Pack, FormatsAndStridesDoNotMatter) {
   MeshView shorts = plain.view();
   shorts.influenceSets = {&set16, 1};
   EXPECT_TRUE(std::ranges::equal(expected.bytes(), packed(shorts, 100).bytes()));
+
+  const std::vector<float> wholeFloats(plain.joints.begin(), plain.joints.end());
+  const InfluenceSet floatSet{floatAttribute(wholeFloats.data(), count, 2), plain.set.weights};
+  MeshView floats = plain.view();
+  floats.influenceSets = {&floatSet, 1};
+  EXPECT_TRUE(std::ranges::equal(expected.bytes(), packed(floats, 100).bytes()));
 }
 
 // ---- Types of positions, normals and tangents

@@ -113,6 +113,20 @@ TEST(Repair, BadInfluencesAreDroppedTheOthersStay) {
   EXPECT_TRUE(pack(result.view(), 10).ok());
 }
 
+TEST(Repair, JointsAsFloatsAreConverted) {
+  OwnedMesh mesh = goodMesh();
+  std::vector<float> joints(mesh.joints.begin(), mesh.joints.end());
+  joints[1 * 4 + 2] = 0.5f;
+  MeshView view = mesh.view();
+  const InfluenceSet floats{floatAttribute(joints.data(), 6, 4), mesh.set.weights};
+  view.influenceSets = {&floats, 1};
+  const RepairedMesh result = repaired(view, 10);
+  const InfluenceSet set = result.view().influenceSets[0];
+  EXPECT_EQ(valueAt<float>(set.weights, 1, 2), 0.0f);
+  EXPECT_EQ(valueAt<float>(set.weights, 1, 1), mesh.weights[1 * 4 + 1]);
+  EXPECT_EQ(valueAt<std::uint32_t>(set.joints, 1, 1), mesh.joints[1 * 4 + 1]);
+}
+
 TEST(Repair, ElementsThatAreNotFiniteBecomeZeroAsAWhole) {
   OwnedMesh mesh = goodMesh();
   std::vector<float> tangents(6 * 4, 0.5f);

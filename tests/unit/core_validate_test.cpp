@@ -101,7 +101,7 @@ struct ValidateTest : public ::testing::Test {
        {Type::float32, Type::unorm8, Type::unorm16},
        {1}},
       {&view.centersOfRotation, "centers of rotation", 12, {Type::float32}, {3}},
-      {&set.joints, "joints", 16, {Type::uint8, Type::uint16, Type::uint32}},
+      {&set.joints, "joints", 16, {Type::float32, Type::uint8, Type::uint16, Type::uint32}},
       {&set.weights, "weights", 16, {Type::float32, Type::unorm8, Type::unorm16}}};
 };
 
@@ -251,6 +251,32 @@ TEST_F(ValidateTest, JointsAndWeightsOfDifferentNumber) {
             "mesh 'Fox': an influence set has 3 joints but 4 weights per vertex");
   set.joints.components = 0;
   onlyFinding(MeshProblem::wrongFormat, 2, 0);
+}
+
+TEST_F(ValidateTest, WhatIsAllowedIsListed) {
+  set.joints.type = Type::unorm8;
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
+            "mesh 'Fox': the joints must have 1 or more components of type float32, uint8, uint16 "
+            "or uint32");
+  set = mesh.set;
+  view.tangents.components = 3;
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
+            "mesh 'Fox': the tangents must have 4 components of type float32, float16, snorm8 or "
+            "snorm16");
+  view.tangents.components = 4;
+  view.positions.components = 2;
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
+            "mesh 'Fox': the positions must have 3 or 4 components of type float32, float16, "
+            "snorm16 or unorm16");
+  view.positions.components = 3;
+  view.bulgeStrengths.type = Type::float16;
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
+            "mesh 'Fox': the bulge strengths must have 1 component of type float32, unorm8 or "
+            "unorm16");
+  view.bulgeStrengths.type = Type::float32;
+  view.centersOfRotation.components = 4;
+  EXPECT_EQ(onlyFinding(MeshProblem::wrongFormat, 1, 0),
+            "mesh 'Fox': the centers of rotation must have 3 components of type float32");
 }
 
 TEST_F(ValidateTest, BadViewsAreNotRead) {
@@ -449,6 +475,33 @@ TEST_F(ValidateTest, JointsEndWithTheLargestPose) {
   EXPECT_EQ(validate(view, maxPoseJoints).findings.size(), 1u);
   EXPECT_EQ(validate(view, 0xffffffffu).findings.size(), 1u) << "joint indices have 16 bits";
   EXPECT_NE(validate(view, 0).find(MeshProblem::jointOutOfRange), nullptr);
+}
+
+TEST_F(ValidateTest, JointsMayBeFloatsIfTheyAreWholeNumbers) {
+  std::vector<float> joints(mesh.joints.begin(), mesh.joints.end());
+  set.joints = floatAttribute(joints.data(), vertexCount, 4);
+  EXPECT_TRUE(findsNothing());
+  joints[6 * 4] = -0.0f;
+  EXPECT_TRUE(findsNothing());
+  const auto expectRefused = [&](float joint, const std::string& sentence) {
+    joints[7 * 4 + 1] = joint;
+    EXPECT_EQ(onlyFinding(MeshProblem::jointOutOfRange, 1, 7),
+              "mesh 'Fox', vertex 7: joint " + sentence);
+  };
+  expectRefused(24, "24 is outside the pose of 24 joints");
+  expectRefused(-1, "-1 is outside the pose of 24 joints");
+  expectRefused(65536, "65536 is outside the pose of 24 joints");
+  expectRefused(-infinity, "-inf is outside the pose of 24 joints");
+  expectRefused(2.5f, "2.5 is not a whole number");
+  expectRefused(23.99999f, "23.9999905 is not a whole number");
+  expectRefused(-0.5f, "-0.5 is not a whole number");
+  expectRefused(nan, "nan is not a whole number");
+  joints[7 * 4 + 1] = 8;
+  joints[7 * 4 + 3] = 0.5f;  // with weight 0
+  EXPECT_EQ(onlyFinding(MeshProblem::unusedJointOutOfRange, 1, 7),
+            "mesh 'Fox', vertex 7: joint 0.5, with weight 0, is not a whole number");
+  joints[0] = 65535;
+  EXPECT_TRUE(validate(view, maxPoseJoints).packable());
 }
 
 // ---- Sums: 2e-7 for each weight that is not 0, or 255 and 65535 exactly

@@ -64,7 +64,7 @@ struct AttributeView {
 /// set of glTF, any number here, the same for joints and weights. An influence of weight 0 is
 /// ignored, whatever its joint is.
 struct InfluenceSet {
-  AttributeView joints;   ///< uint8, uint16 or uint32
+  AttributeView joints;   ///< uint8, uint16, uint32, or float32 with whole numbers
   AttributeView weights;  ///< float32, unorm8 or unorm16
 };
 

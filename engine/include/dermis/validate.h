@@ -31,7 +31,9 @@ enum class MeshProblem : std::uint8_t {
   methodWeightOutOfRange,
   nonFiniteWeight,  ///< NaN or infinite
   negativeWeight,
-  jointOutOfRange,  ///< a joint that the pose does not have, with a weight that is not 0
+  /// A joint that the pose does not have, or a float that is not a whole number, with a weight that
+  /// is not 0.
+  jointOutOfRange,
   // Values that `pack` fixes or ignores, and lengths that do not matter to skinning.
   weightsNotNormalized,   ///< the weights of a vertex do not sum to 1: they are normalized
   duplicateJoint,         ///< a joint occurs twice in a vertex: its weights are added

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "dermis/mesh.h"
+#include "dermis/types.h"
 
 namespace dermis {
 
@@ -38,6 +39,18 @@ inline std::uint32_t loadUnsigned(const AttributeView& view, std::uint32_t eleme
     default:
       return 0;
   }
+}
+
+/// What `loadJoint` returns for a float that is no joint index. No pose has this joint.
+inline constexpr std::uint32_t noJoint = 0xffffffffu;
+
+inline std::uint32_t loadJoint(const AttributeView& view, std::uint32_t element,
+                               std::uint32_t component) {
+  if (view.type != ComponentType::float32) return loadUnsigned(view, element, component);
+  const float value = loadComponent<float>(view, element, component);
+  if (!(value >= 0 && value < static_cast<float>(maxPoseJoints))) return noJoint;
+  const auto joint = static_cast<std::uint32_t>(value);
+  return static_cast<float>(joint) == value ? joint : noJoint;
 }
 
 /// IEEE 754 binary16, which float32 holds exactly.

@@ -123,7 +123,7 @@ Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
     for (const InfluenceSet& set : mesh.influenceSets) {
       for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
         const double weight = loadWeight(set.weights, vertex, slot);
-        const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
+        const std::uint32_t joint = loadJoint(set.joints, vertex, slot);
         const bool good = isGoodInfluence(weight, joint, jointCount);
         repaired.joints_.push_back(good ? joint : 0);
         repaired.weights_.push_back(good ? static_cast<float>(weight / wholeWeight) : 0.0f);

@@ -67,6 +67,9 @@ std::string inWords(double number) {
   return digits;
 }
 
+constexpr const char* typeNames[] = {"float32", "float16", "snorm8", "snorm16", "unorm8",
+                                     "unorm16", "uint8",   "uint16", "uint32"};
+
 struct AttributeRule {
   const char* name;
   std::uint32_t fewest, most;  ///< components
@@ -91,7 +94,7 @@ bool isDisplacementType(ComponentType type) {
   return isFloat(type) || type == ComponentType::snorm16;
 }
 bool isJointType(ComponentType type) {
-  return type == ComponentType::uint8 || type == ComponentType::uint16 ||
+  return isFloat32(type) || type == ComponentType::uint8 || type == ComponentType::uint16 ||
          type == ComponentType::uint32;
 }
 bool isWeightType(ComponentType type) {
@@ -99,12 +102,28 @@ bool isWeightType(ComponentType type) {
          type == ComponentType::unorm16;
 }
 
+/// "3 or 4 components of type float32 or snorm16".
+std::string inWords(const AttributeRule& rule) {
+  std::string words = std::to_string(rule.fewest);
+  if (rule.most != rule.fewest)
+    words += rule.most == anyNumber ? " or more" : " or " + std::to_string(rule.most);
+  words += rule.most == 1 ? " component of type " : " components of type ";
+  std::vector<const char*> names;
+  for (std::size_t type = 0; type < std::size(typeNames); ++type) {
+    if (rule.allows(static_cast<ComponentType>(type))) names.push_back(typeNames[type]);
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) words += i + 1 == names.size() ? " or " : ", ";
+    words += names[i];
+  }
+  return words;
+}
+
 bool checkView(const AttributeView& view, const AttributeRule& rule, std::uint32_t count,
                const char* elements, Findings& findings) {
   const std::string name = rule.name;
   if (!rule.allows(view.type) || view.components < rule.fewest || view.components > rule.most) {
-    findings.addView(MeshProblem::wrongFormat,
-                     name + " have a component type or number of components that is not allowed");
+    findings.addView(MeshProblem::wrongFormat, "the " + name + " must have " + inWords(rule));
     return false;
   }
   if (view.count != count) {
@@ -316,6 +335,22 @@ double allowedDeviation(const MeshView& mesh, std::uint32_t usedWeights) {
   return anyFloat ? 2e-7 * usedWeights : 0.25 / 65535.0;
 }
 
+/// "joint 31", as the mesh stores it.
+std::string jointText(const InfluenceSet& set, std::uint32_t vertex, std::uint32_t slot) {
+  return "joint " + (isFloat32(set.joints.type)
+                         ? inWords(loadReal(set.joints, vertex, slot))
+                         : std::to_string(loadUnsigned(set.joints, vertex, slot)));
+}
+
+/// Why the pose does not have the joint.
+std::string whyOutOfRange(const InfluenceSet& set, std::uint32_t vertex, std::uint32_t slot,
+                          std::uint32_t jointCount) {
+  const double joint = loadReal(set.joints, vertex, slot);
+  return joint != std::floor(joint)
+             ? " is not a whole number"
+             : " is outside the pose of " + std::to_string(jointCount) + " joints";
+}
+
 void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32_t vertex,
                      std::vector<std::uint32_t>& used, Findings& findings) {
   used.clear();
@@ -325,33 +360,32 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
       const double weight = loadWeight(set.weights, vertex, slot);
-      const std::uint32_t joint = loadUnsigned(set.joints, vertex, slot);
+      const std::uint32_t joint = loadJoint(set.joints, vertex, slot);
       if (weight == 0) {
         if (joint < jointCount) continue;
         findings.addVertex(MeshProblem::unusedJointOutOfRange, vertex, [&] {
-          return "joint " + std::to_string(joint) + ", with weight 0, is outside the pose of " +
-                 std::to_string(jointCount) + " joints";
+          return jointText(set, vertex, slot) + ", with weight 0," +
+                 whyOutOfRange(set, vertex, slot, jointCount);
         });
         continue;
       }
       if (!std::isfinite(weight)) {
         findings.addVertex(MeshProblem::nonFiniteWeight, vertex, [&] {
-          return "the weight of joint " + std::to_string(joint) + " is not finite";
+          return "the weight of " + jointText(set, vertex, slot) + " is not finite";
         });
         good = false;
         continue;
       }
       if (weight < 0) {
         findings.addVertex(MeshProblem::negativeWeight, vertex, [&] {
-          return "the weight of joint " + std::to_string(joint) + " is negative";
+          return "the weight of " + jointText(set, vertex, slot) + " is negative";
         });
         good = false;
         continue;
       }
       if (joint >= jointCount) {
         findings.addVertex(MeshProblem::jointOutOfRange, vertex, [&] {
-          return "joint " + std::to_string(joint) + " is outside the pose of " +
-                 std::to_string(jointCount) + " joints";
+          return jointText(set, vertex, slot) + whyOutOfRange(set, vertex, slot, jointCount);
         });
         good = false;
         continue;

@@ -51,8 +51,11 @@ double readWeight(const AttributeView& view, std::size_t vertex, std::uint32_t s
   }
 }
 
+/// The influence must have been checked: a float is then a whole number.
 std::uint32_t readJoint(const AttributeView& view, std::size_t vertex, std::uint32_t slot) {
   switch (view.type) {
+    case ComponentType::float32:
+      return static_cast<std::uint32_t>(load<float>(view, vertex, slot));
     case ComponentType::uint8:
       return load<std::uint8_t>(view, vertex, slot);
     case ComponentType::uint16:

@@ -49,7 +49,7 @@ void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
       const double weight = loadWeight(set.weights, vertex, slot);
-      if (weight != 0) influences.push_back({loadUnsigned(set.joints, vertex, slot), weight});
+      if (weight != 0) influences.push_back({loadJoint(set.joints, vertex, slot), weight});
     }
   }
   std::sort(influences.begin(), influences.end(),

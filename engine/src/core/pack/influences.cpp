@@ -15,7 +15,7 @@ void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInflue
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
       const double weight = loadWeight(set.weights, vertex, slot);
-      if (weight != 0) influences.push_back({loadUnsigned(set.joints, vertex, slot), weight});
+      if (weight != 0) influences.push_back({loadJoint(set.joints, vertex, slot), weight});
     }
   }
   // Also by weight: the order in which duplicates are added must not depend on their slots.
