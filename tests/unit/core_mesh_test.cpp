@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 #include "abi.h"
 #include "dermis/dermis.h"
@@ -60,6 +63,27 @@ TEST(Mesh, GlmMatricesAreTransposedOnTheWay) {
       EXPECT_EQ(joint.m[row][column], static_cast<float>(10 * row + column));
       EXPECT_EQ(back[column][row], static_cast<float>(10 * row + column));
     }
+  }
+}
+
+TEST(Mesh, ArraysOfColumnMajorMatricesAreTransposedOnTheWay) {
+  std::vector<float> floats(3 * 16);
+  for (std::size_t i = 0; i < floats.size(); ++i) floats[i] = static_cast<float>(i);
+  std::vector<JointMatrix> joints(3);
+  ASSERT_TRUE(toJointMatrices(floats, joints).ok());
+  for (std::size_t joint = 0; joint < 3; ++joint) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 4; ++column)
+        EXPECT_EQ(joints[joint].m[row][column], static_cast<float>(joint * 16 + column * 4 + row));
+    }
+  }
+  EXPECT_TRUE(toJointMatrices({}, {}).ok());
+  for (const std::size_t wrong : {47u, 32u, 0u}) {
+    const Result<void> refused = toJointMatrices(std::span(floats).first(wrong), joints);
+    ASSERT_FALSE(refused.ok()) << wrong;
+    EXPECT_EQ(refused.error().code, ErrorCode::invalidArgument);
+    EXPECT_EQ(refused.error().message,
+              std::to_string(wrong) + " floats are not 4x4 matrices for 3 joints");
   }
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "gltf/failure.h"
 #include "gltf/reader.h"
@@ -10,28 +11,19 @@ namespace {
 
 constexpr Format matrixFormat[] = {{TINYGLTF_COMPONENT_TYPE_FLOAT, false}};
 
-// Converts the file's column-major matrix to rows.
-JointMatrix toJointMatrix(const float* columns, const std::string& where, Notes& notes) {
+JointMatrix readMatrix(std::span<const float, 16> columns, const std::string& where, Notes& notes) {
   // The specification requires an exact fourth row, but exporters that invert in float32 leave
   // rounding errors in it. A row farther off may mean something.
   constexpr float refused = 1e-2f;
   float error = 0;
-  JointMatrix matrix;
-  for (int column = 0; column < 4; ++column) {
-    for (int row = 0; row < 4; ++row) {
-      const float value = columns[column * 4 + row];
-      if (!std::isfinite(value)) failInvalid(where, " contains a number that is not finite");
-      if (row < 3) {
-        matrix.m[row][column] = value;
-      } else {
-        error = std::max(error, std::abs(value - (column == 3 ? 1.0f : 0.0f)));
-      }
-    }
+  for (std::size_t i = 0; i < 16; ++i) {
+    if (!std::isfinite(columns[i])) failInvalid(where, " contains a number that is not finite");
+    if (i % 4 == 3) error = std::max(error, std::abs(columns[i] - (i == 15 ? 1.0f : 0.0f)));
   }
   if (error > refused) failInvalid(where, ": its fourth row is not 0 0 0 1");
   if (error > 0)
     notes.broken(NoteKind::matrix, where, ": its fourth row is not exactly 0 0 0 1; it is ignored");
-  return matrix;
+  return toJointMatrix(columns);
 }
 
 std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, std::size_t joints,
@@ -50,8 +42,8 @@ std::vector<JointMatrix> readInverseBindMatrices(Source& source, int accessor, s
   const std::vector<float> floats = source.floats(accessor);
   std::vector<JointMatrix> matrices(joints);
   for (std::size_t i = 0; i < joints; ++i) {
-    matrices[i] = toJointMatrix(floats.data() + i * 16, join(where, ": inverse bind matrix ", i),
-                                source.notes());
+    matrices[i] = readMatrix(std::span(floats).subspan(i * 16).first<16>(),
+                             join(where, ": inverse bind matrix ", i), source.notes());
   }
   return matrices;
 }
