@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "dermis/normals.h"
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/program.h"
@@ -48,7 +49,10 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
       part.tangents = std::move(skinned[index].tangents);
     } else {
       // glTF 2.0, 3.7.2.1: if there are no normals, tangents are ignored and both are computed.
-      part.normals = computeNormals(part.positions, from.primitive->triangles);
+      MeshView posed;
+      posed.vertexCount = static_cast<std::uint32_t>(part.positions.size() / 3);
+      posed.positions = floatAttribute(part.positions.data(), posed.vertexCount, 3);
+      part.normals = samples::must(smoothNormals(posed, from.primitive->triangles));
     }
   }
   return mesh;

@@ -65,9 +65,4 @@ std::vector<std::byte> glbFile(const OutputMesh& mesh);
 Result<void> writeMesh(const std::filesystem::path& path, OutputFormat format,
                        const OutputMesh& mesh);
 
-/// Area-weighted normals of the triangles (3 indices each, all within `positions`, 3 floats per
-/// vertex). A vertex without triangles gets 0 0 1.
-std::vector<float> computeNormals(std::span<const float> positions,
-                                  std::span<const std::uint32_t> triangles);
-
 }  // namespace dermis::cli

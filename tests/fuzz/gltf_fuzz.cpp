@@ -38,8 +38,9 @@ void checkPrimitive(const gltf::Model& model, const gltf::SkinnedPrimitive& skin
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  auto result =
-      gltf::loadFromMemory(std::as_bytes(std::span(data, size)), {}, {.rigidMeshes = true});
+  const gltf::LoadOptions options{.rigidMeshes = true,
+                                  .missingNormals = static_cast<gltf::MissingNormals>(size % 3)};
+  auto result = gltf::loadFromMemory(std::as_bytes(std::span(data, size)), {}, options);
   if (!result) {
     // An error has a sentence, on one line.
     const std::string& message = result.error().message;

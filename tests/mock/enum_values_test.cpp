@@ -460,6 +460,9 @@ TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
     ShaderSource shader{"s", "void main() {}", number<ShaderStage>(value), {}};
     EXPECT_TRUE(value <= 2 || isInvalid(compiler.compile(shader)));
 
+    const gltf::LoadOptions options{.missingNormals = number<gltf::MissingNormals>(value)};
+    EXPECT_EQ(isInvalid(gltf::loadFromMemory({}, {}, options)), value > 2);
+
     gltf::Model model;
     model.nodes.resize(1);
     model.nodeOrder = {0};
@@ -482,7 +485,7 @@ TEST_F(EnumValuesTest, NoEnumIsMissing) {
   const std::set<std::string> known{
       "Method", "VertexFormat", "Motion", "Arrangement", "Kernel", "BufferRole", "PoseWriter",
       "ComponentType", "MeshProblem", "ErrorCode", "Use", "QueueTransfer", "ShaderStage",
-      "Interpolation", "ChannelPath",
+      "Interpolation", "ChannelPath", "MissingNormals",
       // No function reads one: an index of arrays, bit masks, and what functions return.
       "Stream", "Access", "DeviceFeature", "BufferUse", "AlphaMode", "Wrap"};
   std::set<std::string> found;

@@ -7,6 +7,7 @@
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/method.h"
+#include "dermis/normals.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"

@@ -145,7 +145,8 @@ struct Influences {
 
 /// One decoded primitive of a mesh. Attributes are float32 whatever the file stores: normalized
 /// integers are divided by their maximum. Influences keep their types. Vertices are in the order of
-/// the accessors, or of the decoder if Draco compresses the primitive. Values are those of the
+/// the accessors, or of the decoder if Draco compresses the primitive, unless
+/// `MissingNormals::flat` repeats them. Values are those of the
 /// file, so they may be NaN, and joint indices may be outside the skin: `validate` checks both.
 struct Primitive {
   /// For messages, which put it in quotes: "Fox" if its mesh has no other primitive, otherwise "Fox
@@ -261,6 +262,16 @@ struct Model {
   std::uint64_t memoryLeft = 0;
 };
 
+/// What `load` computes for primitives that have triangles and no normals (normals.h).
+enum class MissingNormals : std::uint8_t {
+  leave = 0,   ///< nothing: the primitive has no normals
+  smooth = 1,  ///< smooth normals; its vertices stay
+  /// Flat normals, as glTF 2.0 demands. Its vertices are repeated, one for each corner of a
+  /// triangle, with all their attributes, influences and displacements; `Primitive::triangles`
+  /// counts up. Takes more memory and time.
+  flat = 2,
+};
+
 /// What `load` reads and accepts.
 struct LoadOptions {
   /// Whether to read the images of base colors, by the same rules as buffers. An image that cannot
@@ -272,6 +283,9 @@ struct LoadOptions {
   /// others. A mesh that cannot be read, or that is also used with a skin, is left out, with a
   /// note.
   bool rigidMeshes = false;
+  /// Tangents of a primitive whose normals are computed are ignored, as glTF 2.0 demands, and so
+  /// are the displacements of normals and tangents by its morph targets.
+  MissingNormals missingNormals = MissingNormals::leave;
   /// Whether a broken rule is an error (`invalidData`) even if the meaning is clear. `load` checks
   /// only what it reads, and not the values of vertices: `validate` does that.
   bool strict = false;
@@ -289,6 +303,7 @@ struct LoadOptions {
 /// selects, or scene 0. If the file has no scenes, it consists of all root nodes.
 ///
 /// Fails with
+/// - `invalidArgument` if `LoadOptions::missingNormals` is no value of its type;
 /// - `ioError` if a file cannot be read, or is outside the folder;
 /// - `invalidData` if the file is invalid. The message names the accessor, node or skin at fault.
 ///   An error in a part that nothing skinned or animated uses is a note instead;

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "attribute.h"
+#include "check_mesh.h"
 #include "dermis/types.h"
 #include "strict_floating_point.h"
 #include "text.h"
@@ -201,7 +202,7 @@ bool checkInfluenceSets(const MeshView& mesh, Findings& findings) {
   return good;
 }
 
-bool checkViews(const MeshView& mesh, Findings& findings) {
+bool checkPositions(const MeshView& mesh, Findings& findings) {
   if (mesh.vertexCount == 0) {
     findings.addView(MeshProblem::emptyMesh, "it has no vertices");
     return false;
@@ -210,10 +211,16 @@ bool checkViews(const MeshView& mesh, Findings& findings) {
     findings.addView(MeshProblem::emptyMesh, "it has no positions");
     return false;
   }
+  return checkView(mesh.positions, {"positions", 3, 4, isPositionType}, mesh.vertexCount,
+                   "vertices", findings);
+}
+
+bool checkViews(const MeshView& mesh, Findings& findings) {
+  bool good = checkPositions(mesh, findings);
+  if (mesh.vertexCount == 0 || !mesh.positions) return false;
   const auto check = [&](const AttributeView& view, const AttributeRule& rule) {
     return !view || checkView(view, rule, mesh.vertexCount, "vertices", findings);
   };
-  bool good = check(mesh.positions, {"positions", 3, 4, isPositionType});
   good &= check(mesh.normals, {"normals", 3, 4, isDirectionType});
   good &= check(mesh.tangents, {"tangents", 4, 4, isDirectionType});
   good &= check(mesh.dualQuaternionWeights, {"dual-quaternion weights", 1, 1, isWeightType});
@@ -493,6 +500,12 @@ const MeshFinding* MeshReport::find(MeshProblem problem) const {
     if (finding.problem == problem) return &finding;
   }
   return nullptr;
+}
+
+Result<void> checkPositions(const MeshView& mesh) {
+  Findings findings(mesh.name);
+  checkPositions(mesh, findings);
+  return findings.take().accepted();
 }
 
 MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {

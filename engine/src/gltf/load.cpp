@@ -19,6 +19,8 @@ namespace {
 
 Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& folder,
                 const LoadOptions& options) {
+  if (options.missingNormals > MissingNormals::flat)
+    fail(ErrorCode::invalidArgument, "LoadOptions::missingNormals is no value of MissingNormals");
   Model model;
   MemoryBudget budget;
   budget.addFile(bytes.size());
@@ -37,7 +39,7 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   readSkins(source, model);
   readMaterials(source, model);
   const std::vector<bool> faultyMeshes = checkPrimitives(source);
-  readScene(source, faultyMeshes, options.rigidMeshes, model);
+  readScene(source, faultyMeshes, options, model);
   readAnimations(source, model);
   if (options.images) readImages(appearance, source, files, budget, model);
   model.sideFiles = files.paths();

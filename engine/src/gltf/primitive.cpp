@@ -483,6 +483,7 @@ Primitive PrimitiveReader::read(std::uint32_t meshIndex, std::uint32_t primitive
       triangles_, std::tuple(indices, from.mode, primitive.vertexCount),
       [&] { return decodeTriangles(source_, indices, from.mode, primitive.vertexCount, where); });
   for (const auto& target : from.targets) primitive.morphTargets.push_back(this->target(target));
+  addNormals(source_, missingNormals_, where, primitive);
   return primitive;
 }
 

@@ -39,14 +39,19 @@ void readAnimations(Source& source, Model& model);
 std::vector<bool> checkPrimitives(Source& source);
 
 /// Reads meshes, and skinnedPrimitives: what the default scene skins. Reads only the primitives of
-/// those meshes. With `rigidMeshes`, adds rigid meshes and their skins.
-void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigidMeshes,
+/// those meshes. With `LoadOptions::rigidMeshes`, adds rigid meshes and their skins.
+void readScene(Source& source, const std::vector<bool>& faultyMeshes, const LoadOptions& options,
                Model& model);
+
+/// Computes the normals of a primitive that has none. Its vertices may become others.
+void addNormals(Source& source, MissingNormals kind, const std::string& where,
+                Primitive& primitive);
 
 /// Reads primitives with all their data. Decodes each accessor once, however many use it.
 class PrimitiveReader {
  public:
-  explicit PrimitiveReader(Source& source) : source_(source) {}
+  PrimitiveReader(Source& source, MissingNormals missingNormals)
+      : source_(source), missingNormals_(missingNormals) {}
 
   Primitive read(std::uint32_t mesh, std::uint32_t primitive);
 
@@ -67,6 +72,7 @@ class PrimitiveReader {
   MorphTarget target(const std::map<std::string, int>& attributes);
 
   Source& source_;
+  MissingNormals missingNormals_;
   // By accessor. Joints, weights and colors may be converted.
   std::map<int, SharedArray<float>> floats_, colors_;
   std::map<int, SharedArray<std::byte>> joints_, weights_;

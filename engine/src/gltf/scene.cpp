@@ -123,7 +123,7 @@ void addNote(Model& model, std::size_t count, const char* what, const char* rest
 
 }  // namespace
 
-void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigidMeshes,
+void readScene(Source& source, const std::vector<bool>& faultyMeshes, const LoadOptions& options,
                Model& model) {
   const tinygltf::Model& content = source.content();
   for (const tinygltf::Mesh& from : content.meshes) {
@@ -136,7 +136,7 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigid
   }
 
   const std::vector<bool> reachable = findReachable(source, model);
-  PrimitiveReader reader(source);
+  PrimitiveReader reader(source, options.missingNormals);
   const std::vector<bool> jointsReachable = skinsWithin(model, reachable);
   std::size_t outside = 0, inBindPose = 0;
   std::vector<std::uint32_t> notSkinned;
@@ -166,7 +166,7 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, bool rigid
       model.skinnedPrimitives.push_back({i, node.mesh, j, node.skin});
     }
   }
-  if (rigidMeshes) {
+  if (options.rigidMeshes) {
     RigidMeshes rigid(source, faultyMeshes, reader, model);
     std::erase_if(notSkinned, [&](std::uint32_t node) { return rigid.add(node); });
   }

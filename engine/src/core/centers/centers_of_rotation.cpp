@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <numeric>
 #include <span>
 #include <string>
@@ -15,6 +14,7 @@
 
 #include "attribute.h"
 #include "centers/pair_index.h"
+#include "check_mesh.h"
 #include "dermis/mesh.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
@@ -174,28 +174,6 @@ using centers::Vertices;
 
 Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
   return {code, "mesh " + inQuotes(mesh.name) + what};
-}
-
-Result<void> checkTriangles(const MeshView& mesh, std::span<const std::uint32_t> triangles) {
-  if (triangles.size() % 3 != 0) {
-    return invalid(
-        mesh, ErrorCode::invalidArgument,
-        ": " + std::to_string(triangles.size()) + " vertex indices: not a multiple of 3");
-  }
-  if (triangles.size() / 3 > std::numeric_limits<std::uint32_t>::max()) {
-    return invalid(
-        mesh, ErrorCode::limitExceeded,
-        ": there are more than 2^32 - 1 triangles: " + std::to_string(triangles.size() / 3));
-  }
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    if (triangles[i] >= mesh.vertexCount) {
-      return invalid(mesh, ErrorCode::invalidArgument,
-                     ", triangle " + std::to_string(i / 3) + ": vertex " +
-                         std::to_string(triangles[i]) + " is outside the mesh, which has " +
-                         std::to_string(mesh.vertexCount) + " vertices");
-    }
-  }
-  return {};
 }
 
 Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
