@@ -157,8 +157,8 @@ class DERMIS_VULKAN_API Context {
   /// pass, with a primary or secondary command buffer, for a queue that supports compute.
   /// Afterwards the compute pipeline, the descriptor sets of compute and the push constants are
   /// undefined. Graphics state is not changed. But an engine that uses VK_EXT_descriptor_heap must
-  /// bind its heaps again, for graphics, too: they are no longer bound once descriptor sets are
-  /// bound or constants are pushed.
+  /// bind its heaps and push its data again, for graphics, too: binding descriptor sets or pushing
+  /// constants invalidates both.
   ///
   /// The engine records barriers before and after it (`recordBarrier`). When the GPU executes the
   /// commands, the tables buffer must hold the tables of this plan (`writeTables`). The bindings
