@@ -195,12 +195,11 @@ int main() {
 
   // -- Dermis: its output is a range of the vertex buffer that the engine uses for everything.
   // [range]
-  vulkan::SkinningSystemDescription description;
-  description.context = &context;
+  vulkan::SceneRecorderDescription description;
   description.buffers = {&allocator, createForDermis, destroyForDermis};
-  description.outputCapacity = Capacity::fixed(64 << 10);
+  description.scene.outputCapacity = Capacity::fixed(64 << 10);
   const BufferRequirement needed =
-      must(vulkan::SkinningSystem::requirement(description, BufferRole::positions));
+      must(vulkan::SceneRecorder::requirement(context, description, BufferRole::positions));
   auto vertexInfo = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   vertexInfo.size = 1 << 20;
   vertexInfo.usage = needed.usage | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
@@ -213,12 +212,13 @@ int main() {
 
   int status = 1;
   {
-    vulkan::SkinningSystem scene = must(vulkan::SkinningSystem::create(description));
+    vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
+    Scene& scene = recorder.scene();
     InstanceDescription figure;
     figure.mesh = must(scene.addMesh(must(pack(mesh, 2))));
     figure.pose = must(scene.addPose(2));
     figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-    must(scene.prepare(pipelineNeeds(figure)));
+    must(recorder.prepare(figure));
     const InstanceHandle instance = must(scene.addInstance(figure));
 
     // -- Each frame.
@@ -237,7 +237,7 @@ int main() {
           structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
       must(vkBeginCommandBuffer(engine.commandBuffer, &beginInfo));
       context.recordBarrier(engine.commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
-      must(scene.record(engine.commandBuffer));
+      must(recorder.record(engine.commandBuffer));
       context.recordBarrier(engine.commandBuffer,
                             barrierBetween(Use::dermis, Use::vertexInput | Use::hostRead));
       must(vkEndCommandBuffer(engine.commandBuffer));

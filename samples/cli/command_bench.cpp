@@ -17,7 +17,7 @@
 
 #include "byte_model.h"
 #include "commands.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/batch_runner.h"
 #include "kit/bench/crowd.h"
 #include "kit/bench/throughput.h"
@@ -45,28 +45,27 @@ Result<double> skinFirstFrame(samples::Device& device, const samples::Crowd& cro
   const auto start = std::chrono::steady_clock::now();
   Result<vulkan::Context> context = vulkan::Context::create(device.description());
   if (!context) return context.error();
-  vulkan::SkinningSystemDescription description;
-  description.context = &*context;
-  Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
-  if (!system) return system.error();
+  Result<vulkan::SceneRecorder> recorder = vulkan::SceneRecorder::create(*context);
+  if (!recorder) return recorder.error();
 
-  const Result<MeshHandle> mesh = system->addMesh(*crowd.mesh);
+  const Result<MeshHandle> mesh = recorder->scene().addMesh(*crowd.mesh);
   if (!mesh) return mesh.error();
-  const Result<PoseHandle> pose = system->addPose(crowd.jointCount(), {.mayScale = mayScale});
+  const Result<PoseHandle> pose =
+      recorder->scene().addPose(crowd.jointCount(), {.mayScale = mayScale});
   if (!pose) return pose.error();
   InstanceDescription instance;
   instance.mesh = *mesh;
   instance.pose = *pose;
   instance.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-  if (Result<void> prepared = system->prepare(instance); !prepared) return prepared.error();
-  if (const auto added = system->addInstance(instance); !added) return added.error();
-  if (Result<void> begun = system->beginFrame(1, 0); !begun) return begun.error();
-  const Result<std::span<JointMatrix>> matrices = system->writePose(*pose);
+  if (Result<void> prepared = recorder->prepare(instance); !prepared) return prepared.error();
+  if (const auto added = recorder->scene().addInstance(instance); !added) return added.error();
+  if (Result<void> begun = recorder->scene().beginFrame(1, 0); !begun) return begun.error();
+  const Result<std::span<JointMatrix>> matrices = recorder->scene().writePose(*pose);
   if (!matrices) return matrices.error();
   std::ranges::copy(crowd.poses.front(), matrices->begin());
 
   const Result<void> done =
-      device.run([&](VkCommandBuffer commandBuffer) { return system->record(commandBuffer); });
+      device.run([&](VkCommandBuffer commandBuffer) { return recorder->record(commandBuffer); });
   if (!done) return done.error();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -67,9 +67,8 @@ Result<DrawnScene> DrawnScene::create(samples::OpenDevice& device,
 }
 
 Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
-  vulkan::SkinningSystemDescription description;
-  description.context = &device_->context;
-  description.framesInFlight = 1;
+  vulkan::SceneRecorderDescription description;
+  description.scene.framesInFlight = 1;
   description.tuning = device_->context.tuning();
   std::uint64_t joints = 0, outputs = 0, meshes = 0;
   std::uint32_t instances = 0;
@@ -90,14 +89,15 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
                              what, std::numeric_limits<std::uint32_t>::max())};
   }
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  description.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};
-  description.jointCapacity = {std::max<std::uint64_t>(all, 1)};
-  description.outputCapacity = {std::max<std::uint64_t>(outputs * figures, 4096)};
-  description.instanceCapacity = {std::max(instances * figures, 1u)};
-  description.boundsCapacity = description.instanceCapacity;
-  Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(description);
-  if (!system) return system.error();
-  system_.emplace(std::move(*system));
+  description.scene.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};
+  description.scene.jointCapacity = {std::max<std::uint64_t>(all, 1)};
+  description.scene.outputCapacity = {std::max<std::uint64_t>(outputs * figures, 4096)};
+  description.scene.instanceCapacity = {std::max(instances * figures, 1u)};
+  description.scene.boundsCapacity = description.scene.instanceCapacity;
+  Result<vulkan::SceneRecorder> recorder =
+      vulkan::SceneRecorder::create(device_->context, description);
+  if (!recorder) return recorder.error();
+  recorder_.emplace(std::move(*recorder));
   return {};
 }
 
@@ -115,7 +115,7 @@ Result<void> DrawnScene::addSharedParts(samples::render::Renderer& renderer) {
     shared.geometry = *geometry;
     if (part.mesh == nullptr) continue;
     if (!meshes.contains(part.mesh.get())) {
-      Result<MeshHandle> mesh = system_->addMesh(part.mesh->packed());
+      Result<MeshHandle> mesh = recorder_->scene().addMesh(part.mesh->packed());
       if (!mesh) return mesh.error();
       meshes.emplace(part.mesh.get(), *mesh);
     }
@@ -139,7 +139,8 @@ InstanceDescription DrawnScene::instanceOf(const Figure& figure, std::size_t par
 Result<void> DrawnScene::prepare(const Figure& figure, Method method) {
   for (std::size_t part = 0; part < shared_.size(); ++part) {
     if (!shared_[part].mesh) continue;
-    if (Result<void> done = system_->prepare(instanceOf(figure, part, method)); !done) return done;
+    if (Result<void> done = recorder_->prepare(instanceOf(figure, part, method)); !done)
+      return done;
   }
   return {};
 }
@@ -153,7 +154,7 @@ Result<void> DrawnScene::addFigure(Method method) {
     const std::uint32_t skin = scene_->parts[index].source.skin;
     if (!shared_[index].mesh || isUsed[skin]) continue;
     const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
-    Result<PoseHandle> palette = system_->addPose(joints);
+    Result<PoseHandle> palette = recorder_->scene().addPose(joints);
     if (!palette) return palette.error();
     figure.poses[skin] = *palette;
     isUsed[skin] = true;
@@ -167,7 +168,8 @@ Result<void> DrawnScene::addFigure(Method method) {
 Result<void> DrawnScene::addInstances(Figure& figure, Method method) {
   for (std::size_t index = 0; index < shared_.size(); ++index) {
     if (!shared_[index].mesh) continue;
-    Result<InstanceHandle> instance = system_->addInstance(instanceOf(figure, index, method));
+    Result<InstanceHandle> instance =
+        recorder_->scene().addInstance(instanceOf(figure, index, method));
     if (!instance) return instance.error();
     figure.parts[index].instance = *instance;
   }
@@ -179,7 +181,8 @@ Result<void> DrawnScene::setMethod(std::uint32_t index, Method method) {
   if (Result<void> done = prepare(figure, method); !done) return done;
   for (FigurePart& part : figure.parts) {
     if (!part.instance) continue;
-    if (Result<void> removed = system_->removeInstance(*part.instance); !removed) return removed;
+    if (Result<void> removed = recorder_->scene().removeInstance(*part.instance); !removed)
+      return removed;
     part.instance.reset();
   }
   // The memory of the old instances must be free before there is space for the new ones.
@@ -189,7 +192,7 @@ Result<void> DrawnScene::setMethod(std::uint32_t index, Method method) {
 
 Result<void> DrawnScene::beginFrame() {
   ++frame_;
-  return system_->beginFrame(frame_, frame_ - 1);
+  return recorder_->scene().beginFrame(frame_, frame_ - 1);
 }
 
 Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
@@ -207,12 +210,14 @@ Result<void> DrawnScene::setPose(std::uint32_t index, const ScenePose& pose) {
     posed.isMirrored = samples::render::isMirrored(palette);
     if (!isWritten[part.source.skin]) {
       isWritten[part.source.skin] = true;
-      Result<std::span<JointMatrix>> place = system_->writePose(figure.poses[part.source.skin]);
+      Result<std::span<JointMatrix>> place =
+          recorder_->scene().writePose(figure.poses[part.source.skin]);
       if (!place) return place.error();
       std::ranges::copy(palette, place->begin());
     }
     if (part.primitive->morphTargets.empty()) continue;
-    if (Result<void> set = system_->change({.instance = *posed.instance, .morphs = pose.morphs[i]});
+    if (Result<void> set =
+            recorder_->scene().change({.instance = *posed.instance, .morphs = pose.morphs[i]});
         !set)
       return set;
   }
@@ -241,7 +246,7 @@ Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
   device_->context.recordBarrier(
       commandBuffer, vulkan::barrierBetween(vulkan::Use::vertexInput | vulkan::Use::copyRead,
                                             vulkan::Use::dermis));
-  if (Result<void> done = system_->record(commandBuffer); !done) return done;
+  if (Result<void> done = recorder_->record(commandBuffer); !done) return done;
   device_->context.recordBarrier(
       commandBuffer, vulkan::barrierBetween(vulkan::Use::dermis,
                                             vulkan::Use::vertexInput | vulkan::Use::copyRead));
@@ -258,10 +263,10 @@ Result<void> DrawnScene::addDraws(std::uint32_t figure, const JointMatrix& trans
     draw.transform = transform;
     draw.isMirrored = part.isMirrored;
     if (part.instance) {
-      const Result<InstanceOutput> output = system_->output(*part.instance);
+      const Result<InstanceOutput> output = recorder_->scene().output(*part.instance);
       if (!output) return output.error();
       const auto stream = [&](const OutputAttribute& attribute) -> samples::render::VertexStream {
-        return {system_->outputBuffer(), attribute.offset, attribute.stride, attribute.format};
+        return {recorder_->outputBuffer(), attribute.offset, attribute.stride, attribute.format};
       };
       draw.positions = stream(output->positions);
       if (output->normals.format != VertexFormat::none) draw.normals = stream(output->normals);
@@ -285,7 +290,7 @@ Result<std::optional<Box>> DrawnScene::bounds(std::uint32_t figure) const {
       if (part.fixed.box.min[0] <= part.fixed.box.max[0]) include(all, part.fixed.box);
       continue;
     }
-    const Result<std::optional<Box>> box = system_->bounds(*part.instance);
+    const Result<std::optional<Box>> box = recorder_->scene().bounds(*part.instance);
     if (!box) return box.error();
     if (*box) include(all, **box);
   }

@@ -1,4 +1,4 @@
-// A scene, drawn once or many times from the output of a SkinningSystem.
+// A scene, drawn once or many times from the output of a SceneRecorder.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/device.h"
 #include "kit/render/appearances.h"
 #include "kit/render/renderer.h"
@@ -43,7 +43,7 @@ class DrawnScene {
   /// is finite. Call `beginFrame` first.
   Result<std::optional<Box>> bounds(std::uint32_t figure) const;
 
-  vulkan::SystemStatistics statistics() const { return system_->statistics(); }
+  vulkan::RecorderStatistics statistics() const { return recorder_->statistics(); }
 
   /// Problems of materials that could not be loaded.
   const std::vector<std::string>& notes() const { return appearances_->notes(); }
@@ -83,7 +83,7 @@ class DrawnScene {
 
   samples::OpenDevice* device_ = nullptr;
   const Scene* scene_ = nullptr;
-  std::optional<vulkan::SkinningSystem> system_;
+  std::optional<vulkan::SceneRecorder> recorder_;
   std::uint64_t frame_ = 0;
   std::optional<samples::Appearances> appearances_;
   std::vector<SharedPart> shared_;

@@ -30,8 +30,8 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/cpu/skinning_system.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/cpu/scene_runner.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/batch_runner.h"
 #include "kit/buffer.h"
 #include "kit/character.h"
@@ -135,59 +135,53 @@ InstanceDescription describe(const Part& part, const Options& options) {
   return description;
 }
 
-/// Sets the capacities, so that nothing has to grow later: in bytes, joints and instances.
-template <typename Description>
-void setCapacities(Description& description, const Character& character, const Options& options) {
+/// So large that nothing has to grow later.
+SceneDescription describeScene(const Character& character, const Options& options) {
+  SceneDescription scene;
+  scene.framesInFlight = options.framesInFlight;
+  scene.meshCapacity.initial = 0;
   std::uint64_t joints = 0, outputBytes = 0;
   for (const std::uint32_t count : character.jointCounts()) joints += count;
   for (const Part& part : character.parts()) {
     const VertexLayout layout = describe(part, options).layout;
     outputBytes += must(placeVertices(layout, part.packed.vertexCount())).size;
+    scene.meshCapacity.initial += part.packed.info().byteSize;
   }
   // Memory of removed objects is reused once the GPU has finished the current frame, so there is
   // room for a quarter more.
   const auto withSlack = [](std::uint64_t count) { return count + count / 4 + 64; };
   const std::uint64_t parts = character.parts().size();
-  description.jointCapacity.initial = withSlack((options.figures + 1) * joints);
-  description.instanceCapacity.initial = withSlack((options.figures + 1) * parts);
-  description.outputCapacity.initial = withSlack((options.figures + 1) * outputBytes);
+  scene.jointCapacity.initial = withSlack((options.figures + 1) * joints);
+  scene.instanceCapacity.initial = withSlack((options.figures + 1) * parts);
+  scene.outputCapacity.initial = withSlack((options.figures + 1) * outputBytes);
   if (options.outputBudget != 0)
-    description.outputCapacity = Capacity::fixed(std::uint64_t{options.outputBudget} << 20);
+    scene.outputCapacity = Capacity::fixed(std::uint64_t{options.outputBudget} << 20);
+  return scene;
 }
 
 // [crowd-set-up]
 /// Builds pipelines, so call it from a loading thread.
-vulkan::SkinningSystem createOnDevice(vulkan::Context& context, const Character& character,
-                                      const Options& options, bool measuresGpuTime) {
-  vulkan::SkinningSystemDescription description;
-  description.context = &context;
-  description.framesInFlight = options.framesInFlight;
+vulkan::SceneRecorder createOnDevice(const vulkan::Context& context, const Character& character,
+                                     const Options& options, bool measuresGpuTime) {
+  vulkan::SceneRecorderDescription description;
+  description.scene = describeScene(character, options);
   description.measuresGpuTime = measuresGpuTime;
-  description.meshCapacity.initial = 0;
-  for (const Part& part : character.parts())
-    description.meshCapacity.initial += part.packed.info().byteSize;
-  setCapacities(description, character, options);
-  vulkan::SkinningSystem system = must(vulkan::SkinningSystem::create(description));
-  for (const Part& part : character.parts())
-    must(system.prepare(pipelineNeeds(describe(part, options))));
-  return system;
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
+  for (const Part& part : character.parts()) must(recorder.prepare(describe(part, options)));
+  return recorder;
 }
 // [/crowd-set-up]
 
-/// `System` is vulkan::SkinningSystem or cpu::SkinningSystem.
-template <typename System>
+/// The figures of a scene, whoever executes its frames.
 class Crowd {
  public:
-  Crowd(System system, const Character& character, const Options& options)
-      : system_(std::move(system)),
-        character_(&character),
-        options_(&options),
-        figures_(options.figures) {
+  Crowd(Scene& scene, const Character& character, const Options& options)
+      : scene_(&scene), character_(&character), options_(&options), figures_(options.figures) {
     for (const Part& part : character.parts())
-      meshes_.push_back(must(system_.addMesh(part.packed)));
+      meshes_.push_back(must(scene_->addMesh(part.packed)));
   }
 
-  /// Call it in each frame, before the system records or plans it.
+  /// Call it in each frame, before it is executed.
   void update(std::uint64_t frame) {
     comeAndGo(frame);
     for (const Figure& figure : figures_) {
@@ -195,7 +189,7 @@ class Crowd {
     }
   }
 
-  System& system() { return system_; }
+  Scene& scene() { return *scene_; }
   std::span<const Figure> figures() const { return figures_; }
   /// How often there was no room for a figure.
   std::uint64_t refusals() const { return refusals_; }
@@ -205,7 +199,7 @@ class Crowd {
   /// A figure has a pose for each skin, and an instance of each mesh: body, hair, clothes.
   Result<void> add(Figure& figure) {
     for (const std::uint32_t jointCount : character_->jointCounts()) {
-      const Result<PoseHandle> pose = system_.addPose(jointCount);
+      const Result<PoseHandle> pose = scene_->addPose(jointCount);
       if (!pose) return pose.error();
       figure.poses.push_back(*pose);
     }
@@ -214,7 +208,7 @@ class Crowd {
       InstanceDescription description = describe(part, *options_);
       description.mesh = meshes_[index];
       description.pose = figure.poses[part.skin];
-      const Result<InstanceHandle> instance = system_.addInstance(description);
+      const Result<InstanceHandle> instance = scene_->addInstance(description);
       if (!instance) return instance.error();
       figure.instances.push_back(*instance);
     }
@@ -225,8 +219,8 @@ class Crowd {
   /// complete.
   void remove(Figure& figure) {
     for (const InstanceHandle instance : std::exchange(figure.instances, {}))
-      must(system_.removeInstance(instance));
-    for (const PoseHandle pose : std::exchange(figure.poses, {})) must(system_.removePose(pose));
+      must(scene_->removeInstance(instance));
+    for (const PoseHandle pose : std::exchange(figure.poses, {})) must(scene_->removePose(pose));
   }
 
   void comeAndGo(std::uint64_t frame) {
@@ -248,7 +242,7 @@ class Crowd {
       ++refusals_;  // it is added when others have been removed
       break;
     }
-    if (hasGaps) system_.compact(maxMovedBytes);
+    if (hasGaps) scene_->compact(maxMovedBytes);
   }
   // [/crowd-add]
 
@@ -260,19 +254,19 @@ class Crowd {
       change.updateInterval = figure.now.updateInterval;
       if (!options_->culledOnGpu) change.visible = figure.now.isInView;
       change.teleports = figure.now.teleports;
-      must(system_.change(change));
+      must(scene_->change(change));
     }
     // All instances of a figure are due in the same frames. If the GPU culls, it may skin any
     // figure.
-    if (!options_->culledOnGpu && !must(system_.isDue(figure.instances.front()))) return;
+    if (!options_->culledOnGpu && !must(scene_->isDue(figure.instances.front()))) return;
     for (std::uint32_t skin = 0; skin < figure.poses.size(); ++skin) {
-      const std::span<JointMatrix> pose = must(system_.writePose(figure.poses[skin]));
+      const std::span<JointMatrix> pose = must(scene_->writePose(figure.poses[skin]));
       std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
     }
   }
   // [/crowd-move]
 
-  System system_;
+  Scene* scene_;
   const Character* character_;
   const Options* options_;
   std::vector<MeshHandle> meshes_;  ///< by part
@@ -282,15 +276,14 @@ class Crowd {
 
 /// Writes a word for each instance: its figure is visible or not. An engine's culling does it on
 /// the GPU. Here the CPU writes mapped memory before the submission, which needs no barrier.
-VkBuffer writeVisibility(Crowd<vulkan::SkinningSystem>& crowd, Device& device,
-                         MappedBuffer& buffer) {
-  const std::uint64_t size = std::uint64_t{crowd.system().visibilityCount()} * 4;
+VkBuffer writeVisibility(Crowd& crowd, Device& device, MappedBuffer& buffer) {
+  const std::uint64_t size = std::uint64_t{crowd.scene().visibilityCount()} * 4;
   if (buffer.bytes().size() < size)
     buffer = must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   for (const Figure& figure : crowd.figures()) {
     const std::uint32_t word = figure.now.isInView ? 1 : 0;
     for (const InstanceHandle instance : figure.instances) {
-      const std::size_t index = must(crowd.system().visibilityIndex(instance));
+      const std::size_t index = must(crowd.scene().visibilityIndex(instance));
       std::memcpy(buffer.bytes().data() + index * 4, &word, 4);
     }
   }
@@ -300,10 +293,10 @@ VkBuffer writeVisibility(Crowd<vulkan::SkinningSystem>& crowd, Device& device,
 // [crowd-frame]
 /// Call it in each frame, outside a render pass. `completedFrame` is the newest frame that the GPU
 /// has completed. `visibility` is a buffer that no frame in flight uses.
-void skinFrame(Crowd<vulkan::SkinningSystem>& crowd, std::uint64_t frame,
+void skinFrame(vulkan::SceneRecorder& recorder, Crowd& crowd, std::uint64_t frame,
                std::uint64_t completedFrame, OpenDevice& open, VkCommandBuffer commandBuffer,
                MappedBuffer& visibility, const Options& options) {
-  must(crowd.system().beginFrame(frame, completedFrame));
+  must(crowd.scene().beginFrame(frame, completedFrame));
   crowd.update(frame);
   vulkan::FrameDescription description;
   if (options.culledOnGpu)
@@ -311,12 +304,28 @@ void skinFrame(Crowd<vulkan::SkinningSystem>& crowd, std::uint64_t frame,
 
   // The check copies the vertices. To draw them, use `Use::vertexInput` in both barriers.
   open.context.recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
-  must(crowd.system().record(commandBuffer, description));
+  must(recorder.record(commandBuffer, description));
   open.context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
 }
 // [/crowd-frame]
 
 // -- The report: what the crowd costs.
+
+/// What a frame cost.
+struct Cost {
+  SceneStatistics scene;
+  std::uint32_t dispatches = 0;
+  std::uint64_t uploadedBytes = 0;
+  double cpuSeconds = 0;              ///< to record it
+  std::optional<double> skinSeconds;  ///< of the newest complete frame, if they are known
+  std::uint64_t deviceMemory = 0;     ///< bytes
+};
+
+Cost costOf(const vulkan::SceneRecorder& recorder) {
+  const vulkan::RecorderStatistics own = recorder.statistics();
+  return {recorder.scene().statistics(),       own.dispatches, own.uploadedBytes,
+          own.planSeconds + own.recordSeconds, own.gpuSeconds, own.deviceMemory};
+}
 
 class Report {
  public:
@@ -339,8 +348,8 @@ class Report {
   }
 
   /// Call it after each record.
-  void add(std::span<const Figure> figures, const vulkan::FrameStatistics& work,
-           const vulkan::GpuStatistics& completed) {
+  void add(std::span<const Figure> figures, const Cost& cost) {
+    const FrameStatistics& work = cost.scene.lastFrame;
     std::uint32_t present = 0, inView = 0;
     for (const Figure& figure : figures) {
       if (figure.isThere()) ++present;
@@ -351,21 +360,23 @@ class Report {
     outOfView_ += work.instances - inView;
     skinned_ += work.skinnedInstances;
     vertices_ += work.skinnedVertices;
-    cpuSeconds_ += work.planSeconds + work.recordSeconds;
-    complete(completed);
-    if (frames_ % 20 == 0 || frames_ == options_->frames) addRow(present, work, completed);
+    cpuSeconds_ += cost.cpuSeconds;
+    complete(cost);
+    if (frames_ % 20 == 0 || frames_ == options_->frames) addRow(present, cost);
   }
 
   /// Call it for each frame that the GPU has completed.
-  void complete(const vulkan::GpuStatistics& completed) {
+  void complete(const Cost& cost) {
+    const CullingStatistics& completed = cost.scene.lastCompletedFrame;
     if (completed.frame <= std::exchange(completedFrame_, completed.frame)) return;
     skinned_ += completed.skinnedInstances;
-    gpuSeconds_ += completed.seconds.value_or(0);
+    gpuSeconds_ += cost.skinSeconds.value_or(0);
   }
 
   /// Prints and writes the totals. `validation` has the messages of the validation layer.
-  ExitStatus finish(const vulkan::SystemStatistics& memory, std::uint64_t refusals,
-                    const CharacterCheck& check, std::span<const std::string> validation = {}) {
+  ExitStatus finish(const Cost& cost, std::uint64_t refusals, const CharacterCheck& check,
+                    std::span<const std::string> validation = {}) {
+    const SceneStatistics& memory = cost.scene;
     const std::uint64_t withinInterval = instances_ - outOfView_ - skinned_;
     Json verticesPerSecond;
     if (gpuSeconds_ > 0 && !options_->culledOnGpu)
@@ -385,13 +396,13 @@ class Report {
     json_["memory"] = {{"meshes", store(memory.meshes)},
                        {"palettes", store(memory.palettes)},
                        {"outputs", store(memory.outputs)},
-                       {"device", memory.deviceMemory}};
+                       {"device", cost.deviceMemory}};
     fmt::print("instances {}: {} skinned, {} out of view, {} not due\n", instances_, skinned_,
                outOfView_, withinInterval);
     if (refusals != 0) fmt::print("refused   {} times: there was no room for a figure\n", refusals);
     fmt::print("memory    {:.1f} MiB of outputs; {:.1f} MiB of device memory in total\n",
                static_cast<double>(memory.outputs.used) / (1 << 20),
-               static_cast<double>(memory.deviceMemory) / (1 << 20));
+               static_cast<double>(cost.deviceMemory) / (1 << 20));
     const CharacterCheck::Totals& checked = check.totals();
     json_["check"] = nullptr;
     if (options_->verifies) {
@@ -416,31 +427,30 @@ class Report {
   }
 
  private:
-  void addRow(std::uint32_t present, const vulkan::FrameStatistics& work,
-              const vulkan::GpuStatistics& completed) {
+  void addRow(std::uint32_t present, const Cost& cost) {
+    const FrameStatistics& work = cost.scene.lastFrame;
+    const CullingStatistics& completed = cost.scene.lastCompletedFrame;
     // If the GPU culls, the CPU learns what it skinned when the frame is complete.
     const bool culledOnGpu = options_->culledOnGpu;
     const auto skinned = culledOnGpu ? completed.skinnedInstances : work.skinnedInstances;
     const auto settled = culledOnGpu ? completed.settledInstances : work.settledInstances;
-    const double cpuSeconds = work.planSeconds + work.recordSeconds;
-    const double nanoseconds = work.instances == 0 ? 0 : cpuSeconds * 1e9 / work.instances;
-    json_["rows"].push_back(
-        {{"frame", frames_},
-         {"figures", present},
-         {"instances", work.instances},
-         {"skinned", skinned},
-         {"settled", settled},
-         {"vertices", culledOnGpu ? Json() : Json(work.skinnedVertices)},
-         {"dispatches", work.dispatches},
-         {"uploadedBytes", work.uploadedBytes},
-         {"cpuNanosecondsPerInstance", nanoseconds},
-         {"gpuSeconds", completed.seconds ? Json(*completed.seconds) : Json()}});
+    const double nanoseconds = work.instances == 0 ? 0 : cost.cpuSeconds * 1e9 / work.instances;
+    json_["rows"].push_back({{"frame", frames_},
+                             {"figures", present},
+                             {"instances", work.instances},
+                             {"skinned", skinned},
+                             {"settled", settled},
+                             {"vertices", culledOnGpu ? Json() : Json(work.skinnedVertices)},
+                             {"dispatches", cost.dispatches},
+                             {"uploadedBytes", cost.uploadedBytes},
+                             {"cpuNanosecondsPerInstance", nanoseconds},
+                             {"gpuSeconds", cost.skinSeconds ? Json(*cost.skinSeconds) : Json()}});
     fmt::print(
         "frame {:3} {} figures, {} instances: {} skinned, {} settled; {} dispatches, {} KiB "
         "uploaded, {:.0f} ns an instance to plan and record{}\n",
-        frames_, present, work.instances, skinned, settled, work.dispatches,
-        work.uploadedBytes / 1024, nanoseconds,
-        completed.seconds ? fmt::format("; {:.1f} ms to skin", 1e3 * *completed.seconds) : "");
+        frames_, present, work.instances, skinned, settled, cost.dispatches,
+        cost.uploadedBytes / 1024, nanoseconds,
+        cost.skinSeconds ? fmt::format("; {:.1f} ms to skin", 1e3 * *cost.skinSeconds) : "");
     std::fflush(stdout);
   }
 
@@ -455,8 +465,7 @@ class Report {
 // -- The program: the frame loop, with the check.
 
 /// Tells the check what the system was asked to show.
-template <typename System>
-void follow(CharacterCheck& check, Crowd<System>& crowd, std::uint64_t frame, bool culledOnGpu) {
+void follow(CharacterCheck& check, Crowd& crowd, std::uint64_t frame, bool culledOnGpu) {
   std::vector<AskedInstance> asked;
   for (const Figure& figure : crowd.figures()) {
     const FigureState& now = figure.now;
@@ -464,7 +473,7 @@ void follow(CharacterCheck& check, Crowd<System>& crowd, std::uint64_t frame, bo
       asked.push_back({figure.instances[part], part, now.pose, now.isInView, now.teleports,
                        now.updateInterval});
   }
-  check.follow(frame, asked, crowd.system().skinnedInstances(), culledOnGpu);
+  check.follow(frame, asked, crowd.scene().skinnedInstances(), culledOnGpu);
 }
 
 /// A copy of the output of a frame in flight. No instances: there is nothing to compare.
@@ -475,7 +484,7 @@ struct ReadBack {
 
 /// Records a copy of the output from its beginning to its last visible instance.
 void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
-                    const vulkan::SkinningSystem& system, ReadBack& readBack) {
+                    const vulkan::SceneRecorder& recorder, ReadBack& readBack) {
   std::uint64_t size = 0;
   for (const ShownInstance& instance : readBack.instances)
     size = std::max(size, instance.output.offset + instance.output.size);
@@ -485,7 +494,7 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
         must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   }
   const VkBufferCopy region{0, 0, size};
-  device.functions().CmdCopyBuffer(commandBuffer, system.outputBuffer(), readBack.buffer.handle(),
+  device.functions().CmdCopyBuffer(commandBuffer, recorder.outputBuffer(), readBack.buffer.handle(),
                                    1, &region);
   recordBarrier(device, commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
 }
@@ -493,7 +502,8 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
 ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Options& options) {
   Device& device = *open.device;
   const bool hasTimestamps = must(Timestamps::create(device)).has();
-  Crowd crowd(createOnDevice(open.context, character, options, hasTimestamps), character, options);
+  vulkan::SceneRecorder recorder = createOnDevice(open.context, character, options, hasTimestamps);
+  Crowd crowd(recorder.scene(), character, options);
   CharacterCheck check(character, InstanceDescription().method);
   Report report(character, options, device.info().name, driverVersion(device));
   const std::uint64_t inFlight = options.framesInFlight;
@@ -509,13 +519,13 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
     const VkCommandBuffer commandBuffer = must(loop.begin());
     const std::size_t slot = frame % inFlight;
     if (frame > inFlight && options.checks(loop.completed())) compare(loop.completed());
-    skinFrame(crowd, frame, loop.completed(), open, commandBuffer, visibility[slot], options);
-    const vulkan::SystemStatistics statistics = crowd.system().statistics();
-    report.add(crowd.figures(), statistics.lastFrame, statistics.lastCompletedFrame);
+    skinFrame(recorder, crowd, frame, loop.completed(), open, commandBuffer, visibility[slot],
+              options);
+    report.add(crowd.figures(), costOf(recorder));
     follow(check, crowd, frame, options.culledOnGpu);
     if (options.checks(frame)) {
-      readBacks[slot].instances = check.shown(crowd.system());
-      recordReadBack(device, commandBuffer, crowd.system(), readBacks[slot]);
+      readBacks[slot].instances = check.shown(crowd.scene());
+      recordReadBack(device, commandBuffer, recorder, readBacks[slot]);
     }
     must(loop.submit());
   }
@@ -523,49 +533,44 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
   must(loop.finish());
   for (std::uint64_t frame = compared + 1; frame <= options.frames; ++frame) {
     if (options.checks(frame)) compare(frame);
-    must(crowd.system().beginFrame(frame + inFlight, frame));
-    report.complete(crowd.system().statistics().lastCompletedFrame);
+    must(crowd.scene().beginFrame(frame + inFlight, frame));
+    report.complete(costOf(recorder));
   }
-  return report.finish(crowd.system().statistics(), crowd.refusals(), check,
-                       device.takeValidationMessages());
+  return report.finish(costOf(recorder), crowd.refusals(), check, device.takeValidationMessages());
 }
 
 /// Without Vulkan. All cores skin; the result is there when the jobs are done.
 ExitStatus playOnCpu(const Character& character, const Options& options) {
-  cpu::SkinningSystemDescription description;
-  setCapacities(description, character, options);
-  Crowd crowd(must(cpu::SkinningSystem::create(description)), character, options);
-  cpu::SkinningSystem& system = crowd.system();
+  cpu::SceneRunner runner = must(cpu::SceneRunner::create(describeScene(character, options)));
+  Crowd crowd(runner.scene(), character, options);
   CharacterCheck check(character, InstanceDescription().method);
   Report report(character, options, CpuTarget().name(), "");
-  vulkan::SystemStatistics statistics;
+  Cost cost;
   for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
     using Clock = std::chrono::steady_clock;
-    system.beginFrame();
+    must(crowd.scene().beginFrame(frame, frame - 1));
     crowd.update(frame);
     const auto begin = Clock::now();
-    const std::span<const cpu::PlannedJob> jobs = must(system.jobs());
+    const std::span<const cpu::PlannedJob> jobs = must(runner.jobs());
     const auto planned = Clock::now();
     inParallel(jobs.size(), [&](std::size_t index) { cpu::skin(jobs[index]); });
     const std::chrono::duration<double> planning = planned - begin,
                                         skinning = Clock::now() - planned;
 
-    const SceneStatistics scene = system.statistics();
-    static_cast<FrameWorkStatistics&>(statistics.lastFrame) = scene.lastFrame;
-    statistics.lastCompletedFrame.frame = frame;
-    statistics.lastFrame.planSeconds = planning.count();
-    statistics.lastCompletedFrame.seconds = skinning.count();
-    statistics.outputs = scene.outputs;
-    report.add(crowd.figures(), statistics.lastFrame, statistics.lastCompletedFrame);
+    cost.scene = crowd.scene().statistics();
+    cost.scene.lastCompletedFrame.frame = frame;
+    cost.cpuSeconds = planning.count();
+    cost.skinSeconds = skinning.count();
+    report.add(crowd.figures(), cost);
     follow(check, crowd, frame, false);
-    if (options.checks(frame)) check.compare(frame, check.shown(system), system.outputBytes());
+    if (options.checks(frame)) check.compare(frame, check.shown(crowd.scene()), runner.output());
   }
-  return report.finish(statistics, crowd.refusals(), check);
+  return report.finish(cost, crowd.refusals(), check);
 }
 
 /// Empty if the program should continue.
 std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
-  CLI::App app("Skins a crowd with a SkinningSystem, and compares its vertices with the reference.",
+  CLI::App app("Skins a crowd with a SceneRecorder, and compares its vertices with the reference.",
                "dermis_crowd");
   app.footer(exitStatusHelp);
   app.add_option("--figures", options.figures, "Number of figures [200]")

@@ -239,22 +239,22 @@ int main() {
   vulkan::Context context = must(vulkan::Context::create(device));
 
   // -- Dermis: while loading. The engine creates the buffer of the poses and passes it to Dermis.
-  vulkan::SkinningSystemDescription description;
-  description.context = &context;
+  vulkan::SceneRecorderDescription description;
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  description.gpuJointCapacity = Capacity::fixed(std::uint64_t{figureCount} * jointCount);
+  description.scene.gpuJointCapacity = Capacity::fixed(std::uint64_t{figureCount} * jointCount);
   const BufferRequirement needed =
-      must(vulkan::SkinningSystem::requirement(description, BufferRole::gpuPoses));
+      must(vulkan::SceneRecorder::requirement(context, description, BufferRole::gpuPoses));
   const Buffer poses =
       makeBuffer(engine, needed.size, needed.usage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                  VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
   description.gpuPoses = {poses.buffer, 0, needed.size};
-  vulkan::SkinningSystem scene = must(vulkan::SkinningSystem::create(description));
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
+  Scene& scene = recorder.scene();
 
   InstanceDescription figure;
   figure.mesh = must(scene.addMesh(must(pack(mesh, jointCount))));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-  must(scene.prepare(pipelineNeeds(figure)));
+  must(recorder.prepare(figure));
   // [add]
   std::vector<PoseHandle> handles(figureCount);
   must(scene.addPoses(handles, jointCount, {.writer = PoseWriter::gpu}));
@@ -263,7 +263,7 @@ int main() {
     figure.pose = pose;
     figures.push_back(must(scene.addInstance(figure)));
   }
-  const vulkan::BufferRange first = must(scene.poseRange(handles[0]));
+  const vulkan::BufferRange first = must(recorder.poseRange(handles[0]));
   const Animation animation(engine, {first.buffer, first.offset, first.size * figureCount});
   // [/add]
 
@@ -279,7 +279,7 @@ int main() {
     must(scene.markAllWritten());
     context.recordBarrier(engine.commandBuffer,
                           barrierBetween(Use::computeWrite | Use::vertexInput, Use::dermis));
-    must(scene.record(engine.commandBuffer));
+    must(recorder.record(engine.commandBuffer));
     context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
     // [/frame]
     // An engine draws here.
@@ -297,7 +297,7 @@ int main() {
   must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
   context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
   const VkBufferCopy allVertices{0, 0, outputSize}, allPoses{0, 0, needed.size};
-  vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), vertices.buffer, 1, &allVertices);
+  vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), vertices.buffer, 1, &allVertices);
   vkCmdCopyBuffer(engine.commandBuffer, poses.buffer, matrices.buffer, 1, &allPoses);
   context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
   must(vkEndCommandBuffer(engine.commandBuffer));

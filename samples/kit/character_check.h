@@ -1,4 +1,4 @@
-// What instances of a character must show after a frame, from the documentation of SkinningSystem
+// What instances of a character must show after a frame, from the documentation of SceneRecorder
 // and not from its code, and its comparison with the double-precision reference.
 #pragma once
 
@@ -64,20 +64,19 @@ class CharacterCheck {
       : character_(&character), method_(method) {}
 
   /// Call it once for each frame, after it has been recorded or planned, with all instances.
-  /// `skinned` is `skinnedInstances` of the system.
+  /// `skinned` is `skinnedInstances` of the scene.
   void follow(std::uint64_t frame, std::span<const AskedInstance> instances,
               std::span<const InstanceHandle> skinned, bool culledOnGpu);
 
   /// The visible instances of the frame that was followed last.
-  template <typename System>
-  std::vector<ShownInstance> shown(const System& system) const {
+  std::vector<ShownInstance> shown(const Scene& scene) const {
     std::vector<ShownInstance> all;
     for (const Followed& followed : followed_) {
       if (followed.frame != frame_ || !followed.isVisible) continue;
       ShownInstance& instance = all.emplace_back();
       instance.handle = followed.handle;
       instance.part = followed.part;
-      instance.output = must(system.output(followed.handle));
+      instance.output = must(scene.output(followed.handle));
       for (const Skinned& skinned : followed.skinned) instance.poses.push_back(skinned.pose);
     }
     return all;

@@ -149,16 +149,16 @@ int main() {
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
   device.apiVersion = VK_API_VERSION_1_1;
   vulkan::Context context = must(vulkan::Context::create(device));
-  vulkan::SkinningSystemDescription description;
-  description.context = &context;
+  vulkan::SceneRecorderDescription description;
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  vulkan::SkinningSystem scene = must(vulkan::SkinningSystem::create(description));
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
+  Scene& scene = recorder.scene();
 
   InstanceDescription figure;
   figure.mesh = must(scene.addMesh(must(pack(mesh, 2))));
   figure.pose = must(scene.addPose(2));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-  must(scene.prepare(figure));
+  must(recorder.prepare(figure));
   const InstanceHandle instance = must(scene.addInstance(figure));
   // [/load]
 
@@ -176,12 +176,12 @@ int main() {
     must(scene.beginFrame(frame, frame - 1));
     std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
     context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
-    must(scene.record(engine.commandBuffer));
+    must(recorder.record(engine.commandBuffer));
     context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
     // [/frame]
     // An engine draws here. This program copies the vertices to compare them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
-    vkCmdCopyBuffer(engine.commandBuffer, scene.outputBuffer(), engine.readBack, 1, &copy);
+    vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), engine.readBack, 1, &copy);
     context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
     must(vkEndCommandBuffer(engine.commandBuffer));
     auto submit = structure<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);

@@ -1,4 +1,4 @@
-// What a scene costs in a SkinningSystem, from one instance to ten thousand: the GPU's time by
+// What a scene costs in a SceneRecorder, from one instance to ten thousand: the GPU's time by
 // timestamps, the time from submission to the fence and the CPU's without them, and memory. Prints
 // a table of medians for instances of one mesh, and one for instances of twenty, of which few share
 // what is read of a mesh.
@@ -72,7 +72,7 @@ enum class GpuTime : std::uint8_t { notMeasured, measured };
 class Scene {
  public:
   Scene(samples::OpenDevice& open, const Meshes& from, std::uint32_t instanceCount, GpuTime gpuTime)
-      : engine_(*open.device, description(open, from, instanceCount, gpuTime)) {
+      : engine_(*open.device, open.context, description(open, from, instanceCount, gpuTime)) {
     engine_.begin();
     std::vector<MeshHandle> meshes;
     for (std::uint32_t mesh = 0; mesh < std::min(from.count, instanceCount); ++mesh)
@@ -83,7 +83,7 @@ class Scene {
       instance.mesh = meshes[i % meshes.size()];
       vertexCount_ += engine_.vertexCount(instance.mesh);
       instance.pose = palettes_.emplace_back(engine_.addPose(poses_[0], {.mayScale = false}));
-      if (i == 0) must(engine_->prepare(pipelineNeeds(instance)));
+      if (i == 0) must(engine_.recorder().prepare(instance));
       must(engine_->addInstance(instance));
     }
     engine_.submit();
@@ -106,31 +106,29 @@ class Scene {
     cost.record = lastFrame_.planSeconds + lastFrame_.recordSeconds;
     cost.wall = secondsSince(beforeSubmission) - cost.record;
     engine_.begin();
-    cost.gpu = engine_->statistics().lastCompletedFrame.seconds.value_or(0);
+    cost.gpu = engine_.recorder().statistics().gpuSeconds.value_or(0);
     engine_.submit();
     engine_.finish();
     return cost;
   }
 
   std::uint64_t vertexCount() const { return vertexCount_; }
-  const vulkan::FrameStatistics& lastFrame() const { return lastFrame_; }
-  std::uint64_t deviceMemory() { return engine_->statistics().deviceMemory; }
+  const test::LastFrame& lastFrame() const { return lastFrame_; }
+  std::uint64_t deviceMemory() { return engine_.recorder().statistics().deviceMemory; }
 
  private:
-  static vulkan::SkinningSystemDescription description(samples::OpenDevice& open,
-                                                       const Meshes& from,
-                                                       std::uint32_t instanceCount,
-                                                       GpuTime gpuTime) {
-    vulkan::SkinningSystemDescription description;
-    description.context = &open.context;
+  static vulkan::SceneRecorderDescription description(samples::OpenDevice& open, const Meshes& from,
+                                                      std::uint32_t instanceCount,
+                                                      GpuTime gpuTime) {
+    vulkan::SceneRecorderDescription description;
     description.tuning = open.context.tuning();
-    description.jointCapacity = Capacity::fixed(instanceCount * jointCount);
-    description.instanceCapacity = Capacity::fixed(instanceCount);
-    description.boundsCapacity = Capacity::fixed(0);
+    description.scene.jointCapacity = Capacity::fixed(instanceCount * jointCount);
+    description.scene.instanceCapacity = Capacity::fixed(instanceCount);
+    description.scene.boundsCapacity = Capacity::fixed(0);
     // Positions and normals, and what alignment takes.
     const std::uint64_t vertexCount =
         std::uint64_t{instanceCount} * (from.meanVertexCount + from.count * from.difference / 2);
-    description.outputCapacity =
+    description.scene.outputCapacity =
         Capacity::fixed(vertexCount * 24 + std::uint64_t{instanceCount} * 256);
     description.measuresGpuTime = gpuTime == GpuTime::measured;
     return description;
@@ -142,7 +140,7 @@ class Scene {
   test::SystemEngine engine_;
   std::vector<PoseHandle> palettes_;
   std::uint64_t vertexCount_ = 0;
-  vulkan::FrameStatistics lastFrame_;
+  test::LastFrame lastFrame_;
 };
 
 /// Of at least so many frames and half a second: how a system places threads on cores lasts for
@@ -165,7 +163,7 @@ FrameCost measure(Scene& scene, bool moves, std::uint32_t repetitions) {
 struct Row {
   FrameCost moving, resting;
   double gpuSeconds = 0;
-  vulkan::FrameStatistics frame;  ///< a moving one
+  test::LastFrame frame;  ///< a moving one
   double vertexCount = 0, deviceMemory = 0;
 };
 

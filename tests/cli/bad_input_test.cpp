@@ -919,13 +919,20 @@ TEST_F(BadInput, NoLoaderNoDeviceOrAMissingFeatureIsNamedAndTheReferenceStillWor
 Result<void> useContext(const vulkan::DeviceDescription& description) {
   Result<vulkan::Context> context = vulkan::Context::create(description);
   if (!context) return context.error();
-  const std::array variants{Variant{}, Variant{.kernel = Kernel::palette}};
-  if (Result<void> done = context->prepare(variants); !done) return done;
-  const vulkan::BufferRange range{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, 256};
+  const PoseDescription pose{1};
+  Job job;
+  job.mesh.byteSize = 4096;
+  job.mesh.vertexCount = job.mesh.requiredJoints = job.mesh.maxInfluences = 1;
+  job.positions = {0, 12, VertexFormat::float32x3};
+  Plan plan;
+  const Batch batch{{&pose, 1}, {&job, 1}, 4096, 4096, OutputSizes::oneBuffer(4096)};
+  if (Result<void> made = makePlan(batch, context->limits(), {}, plan); !made) return made;
+  if (Result<void> done = context->prepare(plan.variants()); !done) return done;
+  const vulkan::BufferRange range{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, 4096};
   const Result<vulkan::Bindings> bindings = context->createBindings(
       {range, range, range, range, vulkan::OutputBuffers::oneBuffer(range), range});
   if (!bindings) return bindings.error();
-  return {};
+  return context->record(reinterpret_cast<VkCommandBuffer>(std::uintptr_t{64}), plan, *bindings);
 }
 
 TEST_F(BadInput, ALostDeviceOrTooLittleMemoryIsAnErrorThatLeaksNothing) {

@@ -1,4 +1,4 @@
-// cpu::SkinningSystem: what the model-based test (gpu/system_model_test.cpp) does not do.
+// cpu::SceneRunner: what the model-based test (gpu/system_model_test.cpp) does not do.
 
 #include <gtest/gtest.h>
 
@@ -113,7 +113,7 @@ TEST_F(CpuSceneTest, NoBitDependsOnHowLongJobsAre) {
     engine_.begin();
     writePoses(1);
     std::uint64_t planned = 0;
-    const std::span<const cpu::PlannedJob> jobs = must(engine_->jobs(vertices));
+    const std::span<const cpu::PlannedJob> jobs = must(engine_.runner().jobs(vertices));
     for (const cpu::PlannedJob& job : jobs) {
       planned += job.vertexCount();
       // A job of several instances has at least a block of each.
@@ -132,9 +132,7 @@ TEST_F(CpuSceneTest, TheOutputMayBeTheEngines) {
   const std::uint64_t size = std::uint64_t{vertexCount} * 24;
   // Room for a third one but for its last word, of which half is there.
   std::vector<std::byte> memory(size * 3 - 2 + 64, std::byte{0xa5});
-  cpu::SkinningSystemDescription description;
-  description.output = std::span(memory).subspan(32, size * 3 - 2);
-  CpuEngine engine(description);
+  CpuEngine engine({}, std::span(memory).subspan(32, size * 3 - 2));
   engine.begin();
   InstanceDescription instance;
   instance.mesh = engine.addMesh(packed_);
@@ -146,7 +144,7 @@ TEST_F(CpuSceneTest, TheOutputMayBeTheEngines) {
   ASSERT_FALSE(third.ok());
   EXPECT_EQ(third.error().code, ErrorCode::limitExceeded);
   engine.submit();
-  EXPECT_EQ(engine->outputBytes().data(), memory.data() + 32);
+  EXPECT_EQ(engine.runner().output().data(), memory.data() + 32);
   const auto isUntouched = [](std::byte byte) { return byte == std::byte{0xa5}; };
   EXPECT_TRUE(std::all_of(memory.begin(), memory.begin() + 32, isUntouched));
   EXPECT_TRUE(std::all_of(memory.end() - 32, memory.end(), isUntouched));
@@ -175,22 +173,20 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
                                                {.instance = instances_[1], .visible = false}}};
   expectRefused(engine_->change(changes), "1");
   engine_.begin();
-  static_cast<void>(must(engine_->jobs()));
+  static_cast<void>(must(engine_.runner().jobs()));
   EXPECT_EQ(engine_->skinnedInstances().size(), 1u);
   EXPECT_EQ(engine_->skinnedInstances()[0], instances_[1]);
-  expectRefused(engine_->jobs(), "beginFrame");
+  expectRefused(engine_.runner().jobs(), "beginFrame");
   std::byte little[3];
-  cpu::SkinningSystemDescription tiny;
-  tiny.output = little;
-  expectRefused(cpu::SkinningSystem::create(tiny), "output");
+  expectRefused(cpu::SceneRunner::create({}, little), "output");
 }
 
 // On a 32-bit system these bytes would be counted modulo 2^32.
 TEST(CpuSceneCreationTest, MoreOutputThanAnObjectCanHoldIsRefused) {
-  cpu::SkinningSystemDescription description;
+  SceneDescription description;
   description.outputCapacity =
       Capacity::fixed(std::uint64_t{std::numeric_limits<std::ptrdiff_t>::max()} + 64);
-  const auto system = cpu::SkinningSystem::create(description);
+  const auto system = cpu::SceneRunner::create(description);
   ASSERT_FALSE(system);
   EXPECT_NE(system.error().message.find("outputCapacity"), std::string::npos)
       << system.error().message;
@@ -209,15 +205,18 @@ TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
   for (std::uint32_t frame = 2; frame < 5; ++frame) {
     engine_.writePose(poses_[0], poseOf(frame, 0));
     engine_.writePose(poses_[2], poseOf(frame, 2));
-    if (frame == 3) {
-      engine_.abandon([] {});
-    } else {
-      engine_.submit();
-    }
+    engine_.submit();
     engine_.begin();
     const Box now = must(engine_->bounds(instances_[1])).value();
     EXPECT_EQ(std::memcmp(&first, &now, sizeof(now)), 0);
   }
+  // Until it is skinned again, it has none.
+  engine_.abandon([] {});
+  engine_.begin();
+  EXPECT_FALSE(must(engine_->bounds(instances_[1])).has_value());
+  engine_.submit();
+  engine_.begin();
+  EXPECT_TRUE(must(engine_->bounds(instances_[1])).has_value());
 }
 
 // Whatever its interval is. Positions stored relative to two boxes are no motion.

@@ -203,7 +203,7 @@ TEST(DocumentationTest, WhatIsReadFirstIsShort) {
   EXPECT_GT(shown, 30);
   EXPECT_LE(shown, 60);
 
-  EXPECT_EQ(namesToLearn(code, "samples/minimal"), 11);
+  EXPECT_EQ(namesToLearn(code, "samples/minimal"), 12);
   EXPECT_EQ(namesToLearn(readText("samples/embed/main.cpp"), "samples/embed"), 18);
 }
 

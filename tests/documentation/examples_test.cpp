@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "dermis/cpu/skinning_system.h"
+#include "dermis/cpu/scene_runner.h"
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/scene.h"
@@ -57,7 +57,7 @@ namespace {
 template <typename T>
 T must(Result<T> result) {
   EXPECT_TRUE(result.ok()) << result.error().message;
-  return *std::move(result);
+  if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
 std::vector<std::string> logged;
@@ -174,7 +174,8 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   ThreadPool threadPool;
 
   // [cpu-load]
-  cpu::SkinningSystem scene = must(cpu::SkinningSystem::create());
+  cpu::SceneRunner runner = must(cpu::SceneRunner::create());
+  Scene& scene = runner.scene();
   InstanceDescription figure;
   figure.mesh = must(scene.addMesh(must(packMesh("triangle", vertices, 2))));
   figure.pose = must(scene.addPose(2));
@@ -183,13 +184,13 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   // [/cpu-load]
 
   // [cpu-frame]
-  scene.beginFrame();
+  must(scene.beginFrame(1, 0));
   std::ranges::copy(jointMatrices, must(scene.writePose(figure.pose)).begin());
-  const std::span<const cpu::PlannedJob> jobs = must(scene.jobs());
+  const std::span<const cpu::PlannedJob> jobs = must(runner.jobs());
   for (const cpu::PlannedJob& job : jobs) threadPool.run([&] { cpu::skin(job); });
   threadPool.wait();
   const InstanceOutput output = must(scene.output(instance));
-  const std::byte* skinned = scene.outputBytes().data() + output.offset;
+  const std::byte* skinned = runner.output().data() + output.offset;
   // [/cpu-frame]
 
   std::array<float, 18> floats{};
@@ -201,26 +202,25 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   EXPECT_FLOAT_EQ(floats[5], 1);
 }
 
-/// As a vulkan::SkinningSystem, without Vulkan.
+/// As a vulkan::SceneRecorder, without Vulkan.
 struct DrawnScene {
-  cpu::SkinningSystem system;
   VkBuffer buffer;
-
-  Result<InstanceOutput> output(InstanceHandle instance) const { return system.output(instance); }
   VkBuffer outputBuffer() const { return buffer; }
 };
 
 TEST(DocumentedExampleTest, AnInstanceIsDrawn) {
   int something = 0;
-  DrawnScene scene{must(cpu::SkinningSystem::create()), reinterpret_cast<VkBuffer>(&something)};
+  const DrawnScene recorder{reinterpret_cast<VkBuffer>(&something)};
+  cpu::SceneRunner runner = must(cpu::SceneRunner::create());
+  Scene& scene = runner.scene();
   InstanceDescription figure;
-  figure.mesh = must(scene.system.addMesh(must(packMesh("triangle", threeVertices(), 2))));
-  figure.pose = must(scene.system.addPose(2));
+  figure.mesh = must(scene.addMesh(must(packMesh("triangle", threeVertices(), 2))));
+  figure.pose = must(scene.addPose(2));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
-  must(scene.system.addInstance(figure));
-  const InstanceHandle instance = must(scene.system.addInstance(figure));
-  scene.system.beginFrame();
-  must(scene.system.jobs());
+  must(scene.addInstance(figure));
+  const InstanceHandle instance = must(scene.addInstance(figure));
+  must(scene.beginFrame(1, 0));
+  must(runner.jobs());
   const VkCommandBuffer commandBuffer = VK_NULL_HANDLE;
   const VkBuffer indices = VK_NULL_HANDLE;
   const std::uint32_t indexCount = 3;
@@ -236,7 +236,7 @@ TEST(DocumentedExampleTest, AnInstanceIsDrawn) {
   // [/vertex-input]
   // [draw]
   const InstanceOutput output = must(scene.output(instance));
-  const VkBuffer vertices = scene.outputBuffer();
+  const VkBuffer vertices = recorder.outputBuffer();
   const auto offsets = vulkan::vertexBufferOffsets(figure.layout, output);
   vkCmdBindVertexBuffers(commandBuffer, 0, 1, &vertices, offsets.data());
   vkCmdBindIndexBuffer(commandBuffer, indices, 0, VK_INDEX_TYPE_UINT32);
@@ -246,7 +246,7 @@ TEST(DocumentedExampleTest, AnInstanceIsDrawn) {
   EXPECT_EQ(state.vertexBindingDescriptionCount, 1u);
   EXPECT_EQ(state.vertexAttributeDescriptionCount, 2u);
   EXPECT_EQ(state.pVertexAttributeDescriptions[1].offset, 12u);
-  EXPECT_EQ(drawn.buffer, scene.buffer);
+  EXPECT_EQ(drawn.buffer, recorder.buffer);
   EXPECT_EQ(drawn.offset, output.offset);
   EXPECT_EQ(drawn.indices, 3u);
 }

@@ -2,7 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include <array>
 #include <cctype>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -14,6 +16,7 @@
 #include "dermis/method.h"
 #include "dermis/plan.h"
 #include "run_command.h"
+#include "scene/states.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -63,6 +66,33 @@ std::string pipelines() {
     const Result<std::vector<Variant>> variants = everyVariant(needs, DeviceLimits(), {});
     table += "| `" + std::string(methodName(method)) + "` | " +
              std::to_string(variants ? variants->size() : 0) + " |\n";
+  }
+  return table;
+}
+
+/// What decides whether a frame skins an instance: the tables of the library.
+std::string views() {
+  constexpr std::array names{"shown", "leaving", "hidden", "returning"};
+  std::string table = "| view | hide | show | a frame is executed |\n| --- | --- | --- | --- |\n";
+  for (std::size_t view = 0; view < viewAfter.size(); ++view) {
+    table += std::string("| ") + names[view];
+    for (const View next : viewAfter[view])
+      table += std::string(" | ") + names[static_cast<std::size_t>(next)];
+    table += " |\n";
+  }
+  return table;
+}
+
+std::string actionTable() {
+  constexpr std::array names{"leave", "settle", "skin on the beat", "skin", "restart"};
+  std::string table =
+      "| view | nothing | stale | urgent | restart |\n| --- | --- | --- | --- | --- |\n";
+  constexpr std::array views{"shown", "leaving", "hidden", "returning"};
+  for (std::size_t view = 0; view < actions.size(); ++view) {
+    table += std::string("| ") + views[view];
+    for (const Action action : actions[view])
+      table += std::string(" | ") + names[static_cast<std::size_t>(action)];
+    table += " |\n";
   }
   return table;
 }
@@ -122,6 +152,8 @@ std::string generate(const HeldPart& part) {
   if (part.source == "shapes") return shapes();
   if (part.source == "viewer keys") return viewerKeys();
   if (part.source == "trust") return trust();
+  if (part.source == "views") return views();
+  if (part.source == "actions") return actionTable();
   return {};
 }
 

@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "dermis/cpu/scene_runner.h"
 #include "dermis/cpu/skin.h"
-#include "dermis/cpu/skinning_system.h"
 #include "kit/device.h"
 #include "system_test.h"
 
@@ -78,35 +78,35 @@ class AllocationTest : public SystemTest {
 TEST_F(AllocationTest, WarmFramesAllocateNothing) {
   constexpr std::uint32_t count = 200;
   samples::Device& device = *open_->device;
-  vulkan::SkinningSystemDescription description;
-  description.context = &open_->context;
+  vulkan::SceneRecorderDescription description;
   description.measuresGpuTime = true;
   description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  std::optional<vulkan::SkinningSystem> system = must(vulkan::SkinningSystem::create(description));
+  std::optional<vulkan::SceneRecorder> system =
+      must(vulkan::SceneRecorder::create(open_->context, description));
   const PackedMesh mesh = systemMesh(1, 50);
   InstanceDescription instance;
-  instance.mesh = must(system->addMesh(mesh));
+  instance.mesh = must(system->scene().addMesh(mesh));
   instance.layout = motionLayout();
   std::vector<PoseHandle> cpuPoses, gpuPoses;
   std::vector<InstanceHandle> instances;
   for (std::uint32_t i = 0; i < count; ++i) {
     const PoseWriter writer = i % 3 == 0 ? PoseWriter::gpu : PoseWriter::cpu;
-    instance.pose = must(system->addPose(8, {.writer = writer}));
+    instance.pose = must(system->scene().addPose(8, {.writer = writer}));
     (writer == PoseWriter::gpu ? gpuPoses : cpuPoses).push_back(instance.pose);
     instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;
     instance.bounds = i % 5 == 0;
     instance.culledOnGpu = i % 7 == 0;
     instance.updateInterval = 1 + i % 3;
-    must(system->prepare(pipelineNeeds(instance)));
-    instances.push_back(must(system->addInstance(instance)));
+    must(system->prepare(instance));
+    instances.push_back(must(system->scene().addInstance(instance)));
   }
   const samples::MappedBuffer words = must(samples::MappedBuffer::create(
-      device, system->visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+      device, system->scene().visibilityCount() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::ranges::fill(words.bytes(), std::byte{1});
   const Pose pose = systemPose(1);
   const std::array<MorphWeight, 2> morphs{{{0, 0.5f}, {1, 0.25f}}};
   for (const InstanceHandle each : instances)
-    must(system->change({.instance = each, .morphs = morphs}));
+    must(system->scene().change({.instance = each, .morphs = morphs}));
   std::vector<InstanceVisibility> views(count);
   std::vector<InstanceChange> changes(20);
 
@@ -122,28 +122,29 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
     const bool isLost = frame % 9 == 8;
     {
       const Counting counting;
-      expect(system->beginFrame(frame, frame - 1 - (frame % 9 == 0 ? 1 : 0)).ok());
+      expect(system->scene().beginFrame(frame, frame - 1 - (frame % 9 == 0 ? 1 : 0)).ok());
       for (std::uint32_t i = 0; i < cpuPoses.size(); ++i) {
         if ((i + frame) % 4 == 0) continue;
-        const Result<std::span<JointMatrix>> place = system->writePose(cpuPoses[i]);
+        const Result<std::span<JointMatrix>> place = system->scene().writePose(cpuPoses[i]);
         expect(place.ok());
         std::ranges::copy(pose, place->begin());
       }
-      expect(frame % 2 == 0 ? system->markAllWritten().ok() : system->markWritten(gpuPoses).ok());
+      expect(frame % 2 == 0 ? system->scene().markAllWritten().ok()
+                            : system->scene().markWritten(gpuPoses).ok());
       for (std::uint32_t i = 0; i < count; ++i) views[i] = {instances[i], (i + frame) % 6 != 0, 2};
-      expect(system->setVisibility(views).ok());
+      expect(system->scene().setVisibility(views).ok());
       for (std::uint32_t i = 0; i < changes.size(); ++i) {
         changes[i].instance = instances[(i * 7 + frame) % count];
         changes[i].teleports = i % 3 == 0;
         changes[i].morphs = std::span(morphs).first((i + frame) % 3);
         changes[i].updateInterval = 1 + i % 2;
       }
-      expect(system->change(changes).ok());
+      expect(system->scene().change(changes).ok());
       expect(system->record(commandBuffer, {words.handle(), 0}).ok());
-      if (isLost) expect(system->abandonFrame(frame).ok());
-      expect(system->output(instances[3]).ok());
-      expect(system->bounds(instances[5]).ok());
-      expect(system->statistics().lastFrame.instances == (isLost ? 0 : count));
+      if (isLost) expect(system->scene().abandonFrame(frame).ok());
+      expect(system->scene().output(instances[3]).ok());
+      expect(system->scene().bounds(instances[5]).ok());
+      expect(system->scene().statistics().lastFrame.instances == (isLost ? 0 : count));
     }
     device.functions().EndCommandBuffer(commandBuffer);
     if (!isLost) must(device.submitAndWait(commandBuffer));
@@ -156,12 +157,12 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
 
 TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
   constexpr std::uint32_t count = 200;
-  cpu::SkinningSystem system = must(cpu::SkinningSystem::create());
+  cpu::SceneRunner system = must(cpu::SceneRunner::create());
   InstanceDescription instance;
-  instance.mesh = must(system.addMesh(systemMesh(1, 50)));
+  instance.mesh = must(system.scene().addMesh(systemMesh(1, 50)));
   instance.layout = motionLayout();
   std::vector<PoseHandle> poses(count);
-  must(system.addPoses(poses, 8));
+  must(system.scene().addPoses(poses, 8));
   std::vector<InstanceHandle> instances;
   const std::array<MorphWeight, 2> morphs{{{0, 0.5f}, {1, 0.25f}}};
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -169,8 +170,8 @@ TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
     instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;
     instance.bounds = i % 5 == 0;
     instance.updateInterval = 1 + i % 3;
-    instances.push_back(must(system.addInstance(instance)));
-    if (i % 2 == 0) must(system.change({.instance = instances.back(), .morphs = morphs}));
+    instances.push_back(must(system.scene().addInstance(instance)));
+    if (i % 2 == 0) must(system.scene().change({.instance = instances.back(), .morphs = morphs}));
   }
   const Pose pose = systemPose(1);
   std::vector<InstanceVisibility> views(count);
@@ -181,19 +182,19 @@ TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
   for (std::uint32_t frame = 1; frame <= 60; ++frame) {
     {
       const Counting counting;
-      system.beginFrame();
+      expect(system.scene().beginFrame(frame, frame - 1).ok());
       for (std::uint32_t i = 0; i < count; ++i) {
         if ((i + frame) % 4 == 0) continue;
-        const Result<std::span<JointMatrix>> place = system.writePose(poses[i]);
+        const Result<std::span<JointMatrix>> place = system.scene().writePose(poses[i]);
         expect(place.ok());
         std::ranges::copy(pose, place->begin());
       }
       for (std::uint32_t i = 0; i < count; ++i) views[i] = {instances[i], (i + frame) % 6 != 0, 2};
-      expect(system.setVisibility(views).ok());
+      expect(system.scene().setVisibility(views).ok());
       const auto jobs = system.jobs(1000);
       expect(jobs.ok());
       if (frame % 9 == 8) {
-        expect(system.abandonFrame().ok());
+        expect(system.scene().abandonFrame(frame).ok());
       } else {
         for (const cpu::PlannedJob& job : *jobs) cpu::skin(job);
       }
@@ -202,7 +203,7 @@ TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
       EXPECT_GT(allocations, 0u) << "the first frames have to allocate, or nothing is counted";
       allocations = 0;
     }
-    if (frame > 40) counted += static_cast<std::uint32_t>(system.skinnedInstances().size());
+    if (frame > 40) counted += static_cast<std::uint32_t>(system.scene().skinnedInstances().size());
   }
   EXPECT_GT(counted, 1000u);
   EXPECT_EQ(allocations, 0u);

@@ -156,9 +156,8 @@ TEST_F(KernelReloadTest, AFileThatIsWrittenDuringItsFirstCompilationIsReadAgain)
 // Tier 2, with a frame under way that uses the old pipelines. The validation layer says where one
 // is destroyed too early.
 TEST_F(KernelReloadTest, ASystemIsReloadedBetweenTwoFrames) {
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &*context_;
-  SingleInstance single(device(), system, plainLayout());
+  vulkan::SceneRecorderDescription system = description();
+  SingleInstance single(device(), *context_, system, plainLayout());
   SystemEngine& engine = single.engine;
   engine.submit();
   const Streams original = engine.read(single.instance);

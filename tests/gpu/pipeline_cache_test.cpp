@@ -1,12 +1,12 @@
 // A VkPipelineCache that the engine lends, stores and loads: every pipeline is built with it, those
-// of a SkinningSystem too.
+// of a SceneRecorder too.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <vector>
 
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "intercepted_device.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
@@ -89,14 +89,14 @@ class PipelineCacheTest : public DeviceTest {
   }
 
   static void prepareSystem(vulkan::Context& context) {
-    vulkan::SkinningSystemDescription system;
-    system.context = &context;
-    system.meshCapacity = system.outputCapacity = Capacity::fixed(1 << 20);
-    system.jointCapacity = system.instanceCapacity = system.boundsCapacity = Capacity::fixed(16);
+    vulkan::SceneRecorderDescription system;
+    system.scene.meshCapacity = system.scene.outputCapacity = Capacity::fixed(1 << 20);
+    system.scene.jointCapacity = system.scene.instanceCapacity = system.scene.boundsCapacity =
+        Capacity::fixed(16);
     InstanceDescription instance;
     instance.method = Method::linear;
     instance.culledOnGpu = true;
-    must(must(vulkan::SkinningSystem::create(system)).prepare(pipelineNeeds(instance)));
+    must(must(vulkan::SceneRecorder::create(context, system)).prepare(instance));
   }
 };
 

@@ -16,9 +16,9 @@ class SystemCompactionTest : public SystemTest {
   void SetUp() override {
     SystemTest::SetUp();
     if (device_ == nullptr) return;
-    vulkan::SkinningSystemDescription small = description();
-    small.outputCapacity = Capacity::fixed(64 << 10);
-    engine_.emplace(device(), small);
+    vulkan::SceneRecorderDescription small = description();
+    small.scene.outputCapacity = Capacity::fixed(64 << 10);
+    engine_.emplace(device(), context(), small);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);
     instance_.layout = motionLayout();
@@ -32,14 +32,14 @@ class SystemCompactionTest : public SystemTest {
     engine_.reset();
     SystemTest::TearDown();
   }
-  vulkan::SkinningSystem& system() { return engine_->system(); }
+  Scene& scene() { return engine_->scene(); }
   std::uint64_t offsetOf(std::uint32_t number) {
-    return must(system().output(instances_[number])).offset;
+    return must(scene().output(instances_[number])).offset;
   }
-  std::uint64_t sizeOfOne() { return must(system().output(instances_[1])).size; }
+  std::uint64_t sizeOfOne() { return must(scene().output(instances_[1])).size; }
   void remove(std::initializer_list<std::uint32_t> numbers) {
     engine_->begin();
-    for (const std::uint32_t number : numbers) must(system().removeInstance(instances_[number]));
+    for (const std::uint32_t number : numbers) must(scene().removeInstance(instances_[number]));
     engine_->submit();
     engine_->runFrame();
   }
@@ -67,18 +67,18 @@ TEST_F(SystemCompactionTest, BytesComeAlong) {
   moveAll({1, 3, 4, 5}, 10);
   engine_->submit();
   engine_->begin();
-  const std::uint64_t moved = system().compact(1 << 20);
+  const std::uint64_t moved = scene().compact(1 << 20);
   EXPECT_EQ(moved, 2 * sizeOfOne()) << "two gaps, filled from the end";
   engine_->submit();
-  const std::set<std::uint32_t> listed = indicesOf(system().movedInstances());
+  const std::set<std::uint32_t> listed = indicesOf(scene().movedInstances());
   EXPECT_EQ(listed, (std::set<std::uint32_t>{instances_[4].index, instances_[5].index}));
   EXPECT_LT(offsetOf(5), 4 * sizeOfOne());
   EXPECT_LT(offsetOf(4), 4 * sizeOfOne());
   // They settled in the same frame: nobody moved in it.
   for (const std::uint32_t number : {1u, 3u, 4u, 5u}) expectPose(number, 10, 10);
   engine_->runFrame();
-  EXPECT_TRUE(system().movedInstances().empty());
-  const StoreStatistics outputs = system().statistics().outputs;
+  EXPECT_TRUE(scene().movedInstances().empty());
+  const StoreStatistics outputs = scene().statistics().outputs;
   EXPECT_EQ(outputs.largestFree, outputs.capacity - outputs.used) << "one stretch";
 }
 
@@ -86,9 +86,9 @@ TEST_F(SystemCompactionTest, PreviousPositionsComeAlongWithWhatMoves) {
   remove({0, 2});
   engine_->begin();
   moveAll({1, 3, 4, 5}, 10);
-  system().compact(1 << 20);
+  scene().compact(1 << 20);
   engine_->submit();
-  EXPECT_EQ(system().movedInstances().size(), 2u);
+  EXPECT_EQ(scene().movedInstances().size(), 2u);
   for (const std::uint32_t number : {1u, 3u, 4u, 5u}) expectPose(number, 10, 0);
   engine_->begin();
   moveAll({4, 5}, 20);
@@ -101,7 +101,7 @@ TEST_F(SystemCompactionTest, WhatRestsIsNotSkinned) {
   remove({0, 2});
   engine_->runFrame();
   engine_->begin();
-  EXPECT_GT(system().compact(1 << 20), 0u);
+  EXPECT_GT(scene().compact(1 << 20), 0u);
   engine_->submit();
   EXPECT_EQ(engine_->lastFrame().skinnedInstances, 0u);
   EXPECT_EQ(engine_->lastFrame().dispatches, 0u);
@@ -113,12 +113,12 @@ TEST_F(SystemCompactionTest, TheOldPlaceStaysUntilTheFrameIsComplete) {
   const std::uint64_t oldPlace = offsetOf(5), size = sizeOfOne();
   remove({0});
   engine_->begin();
-  EXPECT_EQ(system().compact(1 << 20), size);
+  EXPECT_EQ(scene().compact(1 << 20), size);
   engine_->submit();
-  ASSERT_EQ(system().movedInstances().size(), 1u);
+  ASSERT_EQ(scene().movedInstances().size(), 1u);
   EXPECT_NE(offsetOf(5), oldPlace);
   const auto expectApart = [&](InstanceHandle added) {
-    const std::uint64_t offset = must(system().output(added)).offset;
+    const std::uint64_t offset = must(scene().output(added)).offset;
     EXPECT_TRUE(offset >= oldPlace + size || offset + size <= oldPlace)
         << "frames under way still read the old place";
   };
@@ -131,31 +131,31 @@ TEST_F(SystemCompactionTest, TheOldPlaceStaysUntilTheFrameIsComplete) {
   engine_->begin();
   const InstanceHandle late = engine_->addInstance(instance_);
   engine_->submit();
-  EXPECT_EQ(must(system().output(late)).offset, oldPlace);
+  EXPECT_EQ(must(scene().output(late)).offset, oldPlace);
 }
 
 TEST_F(SystemCompactionTest, NoMoreBytesThanWereAllowed) {
   remove({0, 1, 2});
-  const std::uint64_t size = must(system().output(instances_[3])).size;
+  const std::uint64_t size = must(scene().output(instances_[3])).size;
   engine_->begin();
-  EXPECT_EQ(system().compact(size - 1), 0u);
+  EXPECT_EQ(scene().compact(size - 1), 0u);
   engine_->submit();
-  EXPECT_TRUE(system().movedInstances().empty());
+  EXPECT_TRUE(scene().movedInstances().empty());
   engine_->begin();
-  EXPECT_EQ(system().compact(2 * size - 1), size);
+  EXPECT_EQ(scene().compact(2 * size - 1), size);
   engine_->submit();
-  EXPECT_EQ(system().movedInstances().size(), 1u);
+  EXPECT_EQ(scene().movedInstances().size(), 1u);
   for (const std::uint32_t number : {3u, 4u, 5u}) expectPose(number, 0, 0);
 }
 
 TEST_F(SystemCompactionTest, WithoutGapsNothingMoves) {
   engine_->begin();
-  EXPECT_EQ(system().compact(1 << 20), 0u);
+  EXPECT_EQ(scene().compact(1 << 20), 0u);
   engine_->submit();
   EXPECT_EQ(engine_->lastFrame().copies, 0u);
   remove({5});
   engine_->begin();
-  EXPECT_EQ(system().compact(1 << 20), 0u) << "the gap is behind them all";
+  EXPECT_EQ(scene().compact(1 << 20), 0u) << "the gap is behind them all";
   engine_->submit();
 }
 
@@ -163,17 +163,17 @@ TEST_F(SystemCompactionTest, WithoutGapsNothingMoves) {
 TEST_F(SystemCompactionTest, WhatGoesBeforeItMovesIsNoTrouble) {
   remove({0, 1});
   engine_->begin();
-  EXPECT_GT(system().compact(1 << 20), 0u);
-  must(system().removeInstance(instances_[5]));
+  EXPECT_GT(scene().compact(1 << 20), 0u);
+  must(scene().removeInstance(instances_[5]));
   const PackedMesh coarse = systemMesh(2, 40);
-  must(system().change({.instance = instances_[4], .mesh = engine_->addMesh(coarse)}));
+  must(scene().change({.instance = instances_[4], .mesh = engine_->addMesh(coarse)}));
   engine_->submit();
   for (const std::uint32_t number : {2u, 3u}) expectPose(number, 0, 0);
   EXPECT_TRUE(engine_->read(instances_[4]) == alone(coarse, systemPose(4), instance_));
   for (int i = 0; i < 4; ++i) engine_->runFrame();
-  const StoreStatistics outputs = system().statistics().outputs;
-  EXPECT_EQ(outputs.used, 2 * must(system().output(instances_[2])).size +
-                              must(system().output(instances_[4])).size)
+  const StoreStatistics outputs = scene().statistics().outputs;
+  EXPECT_EQ(outputs.used,
+            2 * must(scene().output(instances_[2])).size + must(scene().output(instances_[4])).size)
       << "no place is lost";
 }
 
@@ -187,12 +187,12 @@ TEST_F(SystemCompactionTest, AGapSmallerThanAnInstanceTearsNothing) {
   const InstanceHandle largeBehind = engine_->addInstance(instance_);
   engine_->submit();
   engine_->begin();
-  must(system().removeInstance(smallFirst));
+  must(scene().removeInstance(smallFirst));
   engine_->submit();
   for (int i = 0; i < 3; ++i) {
     engine_->runFrame();
     engine_->begin();
-    system().compact(1 << 20);
+    scene().compact(1 << 20);
     engine_->submit();
     for (std::uint32_t number = 0; number < 6; ++number) expectPose(number, 0, 0);
     EXPECT_TRUE(engine_->read(largeBehind) == alone(packed_, systemPose(5), instance_));

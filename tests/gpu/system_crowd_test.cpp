@@ -24,10 +24,10 @@ class SystemCrowdTest : public SystemTest {
       meshes_.push_back(systemMesh(mesh, 16 + mesh * 5, 8, 1 + mesh % 6));
   }
 
-  vulkan::SkinningSystemDescription crowdDescription() {
-    vulkan::SkinningSystemDescription crowd = description();
-    crowd.outputCapacity = Capacity::fixed(8 << 20);
-    crowd.jointCapacity = Capacity::fixed(16384);
+  vulkan::SceneRecorderDescription crowdDescription() {
+    vulkan::SceneRecorderDescription crowd = description();
+    crowd.scene.outputCapacity = Capacity::fixed(8 << 20);
+    crowd.scene.jointCapacity = Capacity::fixed(16384);
     return crowd;
   }
   static Method methodOf(std::uint32_t member) {
@@ -78,7 +78,7 @@ TEST_F(SystemCrowdTest, AThousandInstancesInAnyOrderAreAsIfEachWereAlone) {
   std::iota(order.begin(), order.end(), 0u);
   for (const std::uint32_t seed : {0u, 1u}) {
     if (seed != 0) std::shuffle(order.begin(), order.end(), std::mt19937(seed));
-    SystemEngine engine(device(), crowdDescription());
+    SystemEngine engine(device(), context(), crowdDescription());
     engine.begin();
     const std::vector<MeshHandle> meshes = addMeshes(engine);
     std::map<std::uint32_t, InstanceHandle> crowd;
@@ -90,7 +90,7 @@ TEST_F(SystemCrowdTest, AThousandInstancesInAnyOrderAreAsIfEachWereAlone) {
 }
 
 TEST_F(SystemCrowdTest, WhatCameAndWentBeforeChangesNoBit) {
-  SystemEngine engine(device(), crowdDescription());
+  SystemEngine engine(device(), context(), crowdDescription());
   engine.begin();
   const std::vector<MeshHandle> meshes = addMeshes(engine);
   std::map<std::uint32_t, InstanceHandle> crowd;

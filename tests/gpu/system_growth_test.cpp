@@ -13,30 +13,29 @@ namespace dermis::test {
 namespace {
 
 using vulkan::BufferRange;
-using vulkan::SkinningSystem;
-using vulkan::SkinningSystemDescription;
+using vulkan::SceneRecorder;
+using vulkan::SceneRecorderDescription;
 
 class SystemGrowthTest : public SystemTest {
  protected:
   /// A system in which nearly nothing has room.
-  SkinningSystemDescription tiny() {
-    SkinningSystemDescription tiny = description();
-    tiny.meshCapacity = {16};
-    tiny.jointCapacity = {1};
-    tiny.gpuJointCapacity = {0};
-    tiny.outputCapacity = {4};
-    tiny.instanceCapacity = {1};
-    tiny.boundsCapacity = {0};
+  SceneRecorderDescription tiny() {
+    SceneRecorderDescription tiny = description();
+    tiny.scene.meshCapacity = {16};
+    tiny.scene.jointCapacity = {1};
+    tiny.scene.gpuJointCapacity = {0};
+    tiny.scene.outputCapacity = {4};
+    tiny.scene.instanceCapacity = {1};
+    tiny.scene.boundsCapacity = {0};
     return tiny;
   }
 };
 
 TEST_F(SystemGrowthTest, ASceneOfOneCharacterTakesLessThanAMebibyte) {
-  SkinningSystemDescription defaults;
-  defaults.context = &context();
+  SceneRecorderDescription defaults;
   defaults.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   const PackedMesh character = systemMesh(1, 3273, 19);
-  SystemEngine engine(device(), defaults);
+  SystemEngine engine(device(), context(), defaults);
   engine.begin();
   InstanceDescription instance;
   instance.layout = motionLayout();
@@ -48,8 +47,8 @@ TEST_F(SystemGrowthTest, ASceneOfOneCharacterTakesLessThanAMebibyte) {
   engine.runFrame();
   engine.runFrame();
   engine.begin();  // what the upload took is free
-  const vulkan::SystemStatistics statistics = engine->statistics();
-  const std::uint64_t beside = statistics.deviceMemory - statistics.outputs.capacity;
+  const std::uint64_t beside =
+      engine.recorder().statistics().deviceMemory - engine->statistics().outputs.capacity;
   RecordProperty("kibibytes", static_cast<int>(beside >> 10));
   std::printf("a character of %zu bytes takes %llu KiB beside its output\n",
               character.bytes().size(), static_cast<unsigned long long>(beside >> 10));
@@ -59,7 +58,7 @@ TEST_F(SystemGrowthTest, ASceneOfOneCharacterTakesLessThanAMebibyte) {
 }
 
 TEST_F(SystemGrowthTest, WhatStandsInAnOutputThatGrowsStaysAndTheEngineIsTold) {
-  SystemEngine engine(device(), tiny());
+  SystemEngine engine(device(), context(), tiny());
   const PackedMesh mesh = systemMesh(1, 100);
   engine.begin();
   InstanceDescription instance;
@@ -70,15 +69,15 @@ TEST_F(SystemGrowthTest, WhatStandsInAnOutputThatGrowsStaysAndTheEngineIsTold) {
   engine.submit();
   engine.runFrame();
   engine.begin();
-  const VkBuffer before = engine->outputBuffer();
-  const std::uint64_t generation = engine->outputGeneration();
+  const VkBuffer before = engine.recorder().outputBuffer();
+  const std::uint64_t generation = engine.recorder().outputGeneration();
   const InstanceOutput place = must(engine->output(first));
   for (std::uint32_t i = 0; i < 20; ++i) engine.addInstance(instance);
-  EXPECT_EQ(engine->outputBuffer(), before) << "until it is recorded";
-  EXPECT_EQ(engine->outputGeneration(), generation);
+  EXPECT_EQ(engine.recorder().outputBuffer(), before) << "until it is recorded";
+  EXPECT_EQ(engine.recorder().outputGeneration(), generation);
   engine.submit();
-  EXPECT_NE(engine->outputBuffer(), before);
-  EXPECT_NE(engine->outputGeneration(), generation);
+  EXPECT_NE(engine.recorder().outputBuffer(), before);
+  EXPECT_NE(engine.recorder().outputGeneration(), generation);
   EXPECT_EQ(engine.lastFrame().skinnedInstances, 20u) << "the first one is copied";
   EXPECT_TRUE(engine->movedInstances().empty());
   EXPECT_EQ(must(engine->output(first)).offset, place.offset);
@@ -86,7 +85,7 @@ TEST_F(SystemGrowthTest, WhatStandsInAnOutputThatGrowsStaysAndTheEngineIsTold) {
 }
 
 TEST_F(SystemGrowthTest, AnAbandonedFrameGrowsAgain) {
-  SystemEngine engine(device(), tiny());
+  SystemEngine engine(device(), context(), tiny());
   const PackedMesh mesh = systemMesh(1, 100);
   engine.begin();
   InstanceDescription instance;
@@ -96,17 +95,17 @@ TEST_F(SystemGrowthTest, AnAbandonedFrameGrowsAgain) {
   std::vector<InstanceHandle> instances{engine.addInstance(instance)};
   engine.submit();
   engine.begin(1);
-  const VkBuffer before = engine->outputBuffer();
+  const VkBuffer before = engine.recorder().outputBuffer();
   for (int i = 0; i < 5; ++i) instances.push_back(engine.addInstance(instance));
   std::uint64_t recorded = 0;
   engine.abandon({}, [&] {
-    EXPECT_NE(engine->outputBuffer(), before);
-    recorded = engine->outputGeneration();
+    EXPECT_NE(engine.recorder().outputBuffer(), before);
+    recorded = engine.recorder().outputGeneration();
     // It has to grow once more before the last growth was ever executed.
     for (int i = 0; i < 30; ++i) instances.push_back(engine.addInstance(instance));
   });
-  EXPECT_EQ(engine->outputBuffer(), before);
-  EXPECT_NE(engine->outputGeneration(), recorded);
+  EXPECT_EQ(engine.recorder().outputBuffer(), before);
+  EXPECT_NE(engine.recorder().outputGeneration(), recorded);
   engine.begin(1);
   engine.submit();
   const std::vector<std::byte> bytes = engine.readOutput();
@@ -120,10 +119,9 @@ TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
   vulkan::DeviceDescription lent = device().description();
   lent.enabledExtensions = {};
   vulkan::Context withSets = must(vulkan::Context::create(lent));
-  SkinningSystemDescription system = tiny();
-  system.context = &withSets;
-  system.framesInFlight = 3;
-  SystemEngine engine(device(), system);
+  SceneRecorderDescription system = tiny();
+  system.scene.framesInFlight = 3;
+  SystemEngine engine(device(), withSets, system);
   const PackedMesh mesh = systemMesh(1, 100);
   InstanceDescription instance;
   instance.layout = motionLayout();
@@ -143,46 +141,46 @@ TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
 }
 
 TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
-  SkinningSystemDescription small = tiny();
+  SceneRecorderDescription small = tiny();
   const PackedMesh mesh = systemMesh(1, 100);
-  small.meshCapacity.maximum = 2 * mesh.bytes().size() + 64;
-  small.jointCapacity = {8, 20};
-  small.gpuJointCapacity.maximum = 20;
-  small.outputCapacity.maximum = 10'000;
-  small.boundsCapacity.maximum = 1;
-  small.instanceCapacity.maximum = 2;
-  SkinningSystem system = must(SkinningSystem::create(small));
+  small.scene.meshCapacity.maximum = 2 * mesh.bytes().size() + 64;
+  small.scene.jointCapacity = {8, 20};
+  small.scene.gpuJointCapacity.maximum = 20;
+  small.scene.outputCapacity.maximum = 10'000;
+  small.scene.boundsCapacity.maximum = 1;
+  small.scene.instanceCapacity.maximum = 2;
+  SceneRecorder system = must(SceneRecorder::create(context(), small));
   const auto expectRefused = [](const auto& result, const std::string& text) {
     ASSERT_FALSE(result.ok()) << text;
     EXPECT_EQ(result.error().code, ErrorCode::limitExceeded) << result.error().message;
     EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
   };
-  const MeshHandle first = must(system.addMesh(mesh));
-  must(system.addMesh(mesh));
-  expectRefused(system.addMesh(mesh), "a packed mesh takes");
-  const PoseHandle pose = must(system.addPose(8));
-  must(system.addPose(12));
-  expectRefused(system.addPose(1), "the CPU writes hold 20 joints, of which 20 are in use");
-  must(system.addPose(20, {.writer = PoseWriter::gpu}));
-  expectRefused(system.addPose(1, {.writer = PoseWriter::gpu}),
+  const MeshHandle first = must(system.scene().addMesh(mesh));
+  must(system.scene().addMesh(mesh));
+  expectRefused(system.scene().addMesh(mesh), "a packed mesh takes");
+  const PoseHandle pose = must(system.scene().addPose(8));
+  must(system.scene().addPose(12));
+  expectRefused(system.scene().addPose(1), "the CPU writes hold 20 joints, of which 20 are in use");
+  must(system.scene().addPose(20, {.writer = PoseWriter::gpu}));
+  expectRefused(system.scene().addPose(1, {.writer = PoseWriter::gpu}),
                 "the GPU writes hold 20 joints, of which 20 are in use; their maximum is 20");
   InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
   instance.bounds = true;
-  must(system.addInstance(instance));
-  expectRefused(system.addInstance(instance),
+  must(system.scene().addInstance(instance));
+  expectRefused(system.scene().addInstance(instance),
                 "1 instances have them already: the maximum of boundsCapacity");
   instance.bounds = false;
-  must(system.addInstance(instance));
-  expectRefused(system.addInstance(instance),
+  must(system.scene().addInstance(instance));
+  expectRefused(system.scene().addInstance(instance),
                 "there are 2 instances already: the maximum of instanceCapacity");
   const MeshHandle none = {};
-  EXPECT_FALSE(system.removeMesh(none).ok());
+  EXPECT_FALSE(system.scene().removeMesh(none).ok());
 }
 
 TEST_F(SystemGrowthTest, TheOutputGrowsToItsMaximumAndNoFurther) {
-  SkinningSystemDescription small = tiny();
-  small.outputCapacity.maximum = 9 * 100 * 36;
-  SystemEngine engine(device(), small);
+  SceneRecorderDescription small = tiny();
+  small.scene.outputCapacity.maximum = 9 * 100 * 36;
+  SystemEngine engine(device(), context(), small);
   engine.begin();
   InstanceDescription instance;
   instance.layout = motionLayout();
@@ -202,11 +200,11 @@ TEST_F(SystemGrowthTest, TheOutputGrowsToItsMaximumAndNoFurther) {
 /// Guards around what the system may use of one buffer of the engine's, in which all stands.
 TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   constexpr std::uint64_t part = 85 * 768, guard = 6 * 768;  // of any alignment
-  SkinningSystemDescription ranged = description();
+  SceneRecorderDescription ranged = description();
   VkBufferUsageFlags usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   for (const BufferRole role :
        {BufferRole::meshes, BufferRole::poses, BufferRole::gpuPoses, BufferRole::positions}) {
-    const BufferRequirement needed = must(SkinningSystem::requirement(ranged, role));
+    const BufferRequirement needed = must(SceneRecorder::requirement(context(), ranged, role));
     EXPECT_EQ(guard % needed.alignment, 0u);
     EXPECT_NE(needed.usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, 0u);
     usage |= needed.usage;
@@ -221,8 +219,8 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   ranged.poses = {rangeOf(1), heap.bytes().data() + rangeOf(1).offset};
   ranged.gpuPoses = rangeOf(2);
   ranged.output = rangeOf(3);
-  ranged.outputCapacity = Capacity::fixed(heap.bytes().size());  // what the test reads
-  SystemEngine engine(device(), ranged);
+  ranged.scene.outputCapacity = Capacity::fixed(heap.bytes().size());  // what the test reads
+  SystemEngine engine(device(), context(), ranged);
   engine.begin();
   const PackedMesh mesh = systemMesh(1, 200);
   std::vector<InstanceHandle> instances;
@@ -237,7 +235,7 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
     descriptions.push_back(instance);
     instances.push_back(engine.addInstance(instance));
   }
-  const BufferRange pose = must(engine->poseRange(descriptions[0].pose));
+  const BufferRange pose = must(engine.recorder().poseRange(descriptions[0].pose));
   EXPECT_EQ(pose.buffer, heap.handle());
   EXPECT_GE(pose.offset, ranged.gpuPoses.offset);
   engine.submit();
@@ -266,17 +264,16 @@ TEST_F(SystemGrowthTest, RangesOfNoWholeJointsAreNotBoundToTheirEnd) {
   small.changeLimits([](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = most; });
   CommandLog log(small);
   vulkan::Context narrow = must(vulkan::Context::create(small.description()));
-  SkinningSystemDescription ranged = tiny();
-  ranged.context = &narrow;
-  ranged.framesInFlight = 1;
+  SceneRecorderDescription ranged = tiny();
+  ranged.scene.framesInFlight = 1;
   const VkBufferUsageFlags usage =
-      must(SkinningSystem::requirement(ranged, BufferRole::meshes)).usage |
-      must(SkinningSystem::requirement(ranged, BufferRole::gpuPoses)).usage |
+      must(SceneRecorder::requirement(narrow, ranged, BufferRole::meshes)).usage |
+      must(SceneRecorder::requirement(narrow, ranged, BufferRole::gpuPoses)).usage |
       VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   samples::MappedBuffer heap = must(samples::MappedBuffer::create(device(), 4 * most, usage));
   ranged.meshes = {heap.handle(), 0, most + 8};
   ranged.gpuPoses = {heap.handle(), 2 * most, most + 8};
-  SystemEngine engine(device(), ranged);
+  SystemEngine engine(device(), narrow, ranged);
   engine.begin();
   InstanceDescription instance;
   instance.layout = motionLayout();
@@ -295,15 +292,15 @@ TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {
       must(samples::MappedBuffer::create(device(), 1 << 16, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   const BufferRange good{buffer.handle(), 0, 4096}, odd{buffer.handle(), 0, 1026};
   const auto expectRefused = [&](const char* field, const auto& change) {
-    SkinningSystemDescription bad = description();
+    SceneRecorderDescription bad = description();
     change(bad);
-    const Result<SkinningSystem> system = SkinningSystem::create(bad);
+    const Result<SceneRecorder> system = SceneRecorder::create(context(), bad);
     ASSERT_FALSE(system.ok()) << field;
     EXPECT_EQ(system.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(system.error().message.find(std::string("::") + field), std::string::npos)
         << system.error().message;
   };
-  using Description = SkinningSystemDescription;
+  using Description = SceneRecorderDescription;
   expectRefused("meshes ", [&](Description& d) { d.meshes = odd; });
   expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = odd; });
   expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = {buffer.handle(), 0, 44}; });
@@ -313,9 +310,9 @@ TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {
 }
 
 TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
-  SkinningSystem system = must(SkinningSystem::create(tiny()));
+  SceneRecorder system = must(SceneRecorder::create(context(), tiny()));
   std::vector<PoseHandle> poses(1000);
-  must(system.addPoses(poses, 7, {.writer = PoseWriter::gpu}));
+  must(system.scene().addPoses(poses, 7, {.writer = PoseWriter::gpu}));
   const BufferRange first = must(system.poseRange(poses[0]));
   EXPECT_EQ(first.size, 7 * sizeof(JointMatrix));
   for (std::uint32_t i = 0; i < poses.size(); ++i) {
@@ -324,24 +321,23 @@ TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
     EXPECT_EQ(range.offset, first.offset + i * first.size);
   }
   std::vector<PoseHandle> others(50);
-  must(system.addPoses(others, 300, {.writer = PoseWriter::gpu}));
+  must(system.scene().addPoses(others, 300, {.writer = PoseWriter::gpu}));
   // On lavapipe these are multiples of the alignment anyway, under profiles of other devices not.
-  const PoseHandle single = must(system.addPose(1, {.writer = PoseWriter::gpu}));
-  const PoseHandle next = must(system.addPose(1, {.writer = PoseWriter::gpu}));
+  const PoseHandle single = must(system.scene().addPose(1, {.writer = PoseWriter::gpu}));
+  const PoseHandle next = must(system.scene().addPose(1, {.writer = PoseWriter::gpu}));
   for (const PoseHandle bound : {poses[0], others[0], single, next}) {
     EXPECT_EQ(
         must(system.poseRange(bound)).offset % context().limits().minStorageBufferOffsetAlignment,
         0u);
   }
   EXPECT_EQ(must(system.poseRange(poses[0])).buffer, first.buffer) << "poses never move";
-  must(system.addPoses({}, 7));
+  must(system.scene().addPoses({}, 7));
 }
 
 TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
-  SystemEngine engine(device(), tiny());
+  SystemEngine engine(device(), context(), tiny());
   const PoseHandle ofGpu = must(engine->addPose(4, {.writer = PoseWriter::gpu}));
   const PoseHandle ofCpu = must(engine->addPose(4));
-  EXPECT_FALSE(engine->markWritten({&ofGpu, 1}).ok()) << "no frame has begun";
   engine.begin();
   const auto expectRefused = [](const auto& result, const std::string& text) {
     ASSERT_FALSE(result.ok()) << text;
@@ -350,17 +346,18 @@ TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
   };
   expectRefused(engine->writePose(ofGpu), "is written by the GPU; use markWritten");
   expectRefused(engine->markWritten({&ofCpu, 1}), "is written by the CPU; use writePose");
-  expectRefused(engine->poseRange(ofCpu), "is written by the CPU; use writePose");
+  expectRefused(engine.recorder().poseRange(ofCpu), "is written by the CPU; use writePose");
   must(engine->markWritten({&ofGpu, 1}));
   must(engine->markAllWritten());
   must(engine->removePose(ofGpu));
   expectRefused(engine->markWritten({&ofGpu, 1}), "there is no pose");
   engine.submit();
+  expectRefused(engine->writePose(ofCpu), "only between beginFrame and record");
 }
 
 // As the plan decides.
 TEST_F(SystemGrowthTest, WhatIsDueIsSkinned) {
-  SystemEngine engine(device(), tiny());
+  SystemEngine engine(device(), context(), tiny());
   engine.begin();
   InstanceDescription instance;
   instance.mesh = engine.addMesh(systemMesh(1, 20));
@@ -395,7 +392,7 @@ TEST_F(SystemGrowthTest, WhatIsDueIsSkinned) {
 
 // Bounds, too: what the model of system_model_test.cpp does not know. Their buffer grows.
 TEST_F(SystemGrowthTest, MarkedPosesAreSkinnedAndOthersRest) {
-  SystemEngine engine(device(), tiny());
+  SystemEngine engine(device(), context(), tiny());
   const PackedMesh mesh = systemMesh(1, 100);
   engine.begin();
   InstanceDescription instance;

@@ -11,14 +11,14 @@
 namespace dermis::test {
 namespace {
 
-using vulkan::SkinningSystem;
-using vulkan::SkinningSystemDescription;
+using vulkan::SceneRecorder;
+using vulkan::SceneRecorderDescription;
 
 class SystemHandlesTest : public SystemTest {
  protected:
   void SetUp() override {
     SystemTest::SetUp();
-    if (device_ != nullptr) one_.emplace(device(), description(), motionLayout());
+    if (device_ != nullptr) one_.emplace(device(), context(), description(), motionLayout());
   }
   void TearDown() override {
     one_.reset();
@@ -46,18 +46,18 @@ class SystemHandlesTest : public SystemTest {
            std::to_string(handle.generation);
   }
   void expectStaleInstance(InstanceHandle instance) {
-    SkinningSystem& system = engine().system();
+    Scene& scene = engine().scene();
     const std::string text = unknown("instance", instance);
-    expectInvalid(system.removeInstance(instance), text);
-    expectInvalid(system.change({.instance = instance, .visible = false}), text);
-    expectInvalid(system.change({.instance = instance, .updateInterval = 2}), text);
-    expectInvalid(system.change({.instance = instance, .teleports = true}), text);
-    expectInvalid(system.change({.instance = instance, .morphs = std::span<const MorphWeight>()}),
+    expectInvalid(scene.removeInstance(instance), text);
+    expectInvalid(scene.change({.instance = instance, .visible = false}), text);
+    expectInvalid(scene.change({.instance = instance, .updateInterval = 2}), text);
+    expectInvalid(scene.change({.instance = instance, .teleports = true}), text);
+    expectInvalid(scene.change({.instance = instance, .morphs = std::span<const MorphWeight>()}),
                   text);
-    expectInvalid(system.change({.instance = instance, .mesh = one_->description.mesh}), text);
-    expectInvalid(system.output(instance), text);
-    expectInvalid(system.bounds(instance), text);
-    expectInvalid(system.visibilityIndex(instance), text);
+    expectInvalid(scene.change({.instance = instance, .mesh = one_->description.mesh}), text);
+    expectInvalid(scene.output(instance), text);
+    expectInvalid(scene.bounds(instance), text);
+    expectInvalid(scene.visibilityIndex(instance), text);
   }
 
   std::optional<SingleInstance> one_;
@@ -204,11 +204,11 @@ TEST_F(SystemHandlesTest, ChangesThatBreakARuleAreRefused) {
 }
 
 TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
-  SkinningSystemDescription small = description();
+  SceneRecorderDescription small = description();
   const PackedMesh mesh = systemMesh(1, 100);
-  small.meshCapacity = Capacity::fixed(mesh.bytes().size() + 16);
-  small.jointCapacity = Capacity::fixed(20);
-  SystemEngine full(device(), small);
+  small.scene.meshCapacity = Capacity::fixed(mesh.bytes().size() + 16);
+  small.scene.jointCapacity = Capacity::fixed(20);
+  SystemEngine full(device(), context(), small);
   full.begin();
   const MeshHandle first = full.addMesh(mesh);
   expectRefused(full->addMesh(mesh), ErrorCode::limitExceeded, "bytes of meshes only 16 are free");
@@ -228,12 +228,12 @@ TEST_F(SystemHandlesTest, BudgetsThatAreFullRefuse) {
 // Whatever another palette has left in its memory, and whether or not the frame in which it was
 // added had anything else to do.
 TEST_F(SystemHandlesTest, APoseRestsInTheIdentityUntilItIsWritten) {
-  SkinningSystemDescription small = description();
-  small.jointCapacity = Capacity::fixed(8);
+  SceneRecorderDescription small = description();
+  small.scene.jointCapacity = Capacity::fixed(8);
   for (const bool hasWork : {false, true}) {
-    SingleInstance one(device(), small, plainLayout());
+    SingleInstance one(device(), context(), small, plainLayout());
     one.engine.submit();
-    for (std::uint32_t frame = 0; frame < small.framesInFlight; ++frame) {
+    for (std::uint32_t frame = 0; frame < small.scene.framesInFlight; ++frame) {
       one.engine.begin();
       one.engine.writePose(one.description.pose, systemPose(3 + frame));
       one.engine.submit();
@@ -256,10 +256,10 @@ TEST_F(SystemHandlesTest, APoseRestsInTheIdentityUntilItIsWritten) {
 }
 
 TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
-  SkinningSystemDescription small = description();
-  small.instanceCapacity = Capacity::fixed(3);
-  small.boundsCapacity = Capacity::fixed(1);
-  SingleInstance first(device(), small, plainLayout());
+  SceneRecorderDescription small = description();
+  small.scene.instanceCapacity = Capacity::fixed(3);
+  small.scene.boundsCapacity = Capacity::fixed(1);
+  SingleInstance first(device(), context(), small, plainLayout());
   EXPECT_EQ(first.engine->visibilityCount(), 3u);
   InstanceDescription bounded = first.description;
   bounded.bounds = true;
@@ -276,72 +276,74 @@ TEST_F(SystemHandlesTest, MoreInstancesAndBoundsThanBudgetedAreRefused) {
 }
 
 TEST_F(SystemHandlesTest, FramesAreCountedUpwards) {
-  SkinningSystem system = must(SkinningSystem::create(description()));
+  SceneRecorder system = must(SceneRecorder::create(context(), description()));
   expectInvalid(system.record(VK_NULL_HANDLE), "beginFrame must be called before each frame");
-  const PoseHandle palette = must(system.addPose(4));
-  expectInvalid(system.writePose(palette), "only between beginFrame and record");
-  expectInvalid(system.beginFrame(0, 0), "the frame must be larger than 0");
-  must(system.beginFrame(1, 0));
-  expectInvalid(system.beginFrame(1, 0), "the frame must be larger than 1");
+  const PoseHandle palette = must(system.scene().addPose(4));
+  must(system.scene().writePose(palette));  // for the first frame
+  expectInvalid(system.scene().beginFrame(0, 0), "the frame must be larger than 0");
+  must(system.scene().beginFrame(1, 0));
+  expectInvalid(system.scene().beginFrame(1, 0), "the frame must be larger than 1");
   must(system.record(VK_NULL_HANDLE));  // nothing to do
-  expectInvalid(system.beginFrame(2, 2), "less than the frame");
-  must(system.beginFrame(2, 0));
+  expectInvalid(system.scene().beginFrame(2, 2), "less than the frame");
+  must(system.scene().beginFrame(2, 0));
   must(system.record(VK_NULL_HANDLE));
-  expectInvalid(system.beginFrame(3, 0),
+  expectInvalid(system.scene().beginFrame(3, 0),
                 "more frames are in flight than framesInFlight, which is 2");
-  must(system.beginFrame(3, 2));
-  expectInvalid(system.beginFrame(4, 1), "the completed frame at least 2");
-  expectInvalid(system.beginFrame(2, 1), "the frame must be larger than 3");
-  must(system.beginFrame(4, 3));
+  must(system.scene().beginFrame(3, 2));
+  expectInvalid(system.scene().beginFrame(4, 1), "the completed frame at least 2");
+  expectInvalid(system.scene().beginFrame(2, 1), "the frame must be larger than 3");
+  must(system.scene().beginFrame(4, 3));
 }
 
 TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
   engine().submit();
-  expectInvalid(engine()->record(VK_NULL_HANDLE), "beginFrame must be called before each frame");
+  expectInvalid(engine().recorder().record(VK_NULL_HANDLE),
+                "beginFrame must be called before each frame");
   expectInvalid(engine()->writePose(one_->description.pose), "only between beginFrame and record");
 }
 
 TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
-  using Change = std::function<void(SkinningSystemDescription&)>;
+  using Change = std::function<void(SceneRecorderDescription&)>;
   const auto create = [](void*, const vulkan::BufferRequest&) -> Result<vulkan::CreatedBuffer> {
     return Error{ErrorCode::ioError, "never called"};
   };
   const std::pair<const char*, Change> changes[] = {
-      {"context", [](SkinningSystemDescription& d) { d.context = nullptr; }},
-      {"framesInFlight", [](SkinningSystemDescription& d) { d.framesInFlight = 0; }},
-      {"meshCapacity", [](SkinningSystemDescription& d) { d.meshCapacity = Capacity::fixed(0); }},
+      {"framesInFlight", [](SceneRecorderDescription& d) { d.scene.framesInFlight = 0; }},
+      {"meshCapacity",
+       [](SceneRecorderDescription& d) { d.scene.meshCapacity = Capacity::fixed(0); }},
       {"jointCapacity",
-       [](SkinningSystemDescription& d) {
-         d.jointCapacity = {2, 1};
+       [](SceneRecorderDescription& d) {
+         d.scene.jointCapacity = {2, 1};
        }},
       {"outputCapacity",
-       [](SkinningSystemDescription& d) { d.outputCapacity = Capacity::fixed(0); }},
+       [](SceneRecorderDescription& d) { d.scene.outputCapacity = Capacity::fixed(0); }},
       {"instanceCapacity",
-       [](SkinningSystemDescription& d) { d.instanceCapacity = Capacity::fixed(0); }},
-      {"buffers", [&](SkinningSystemDescription& d) { d.buffers.create = create; }},
+       [](SceneRecorderDescription& d) { d.scene.instanceCapacity = Capacity::fixed(0); }},
+      {"buffers", [&](SceneRecorderDescription& d) { d.buffers.create = create; }},
       {"Tuning::workgroupSize",
-       [](SkinningSystemDescription& d) {
+       [](SceneRecorderDescription& d) {
          d.tuning = Tuning{33, 4};
        }},
   };
   for (const auto& [field, change] : changes) {
-    SkinningSystemDescription broken = description();
+    SceneRecorderDescription broken = description();
     change(broken);
-    const Result<SkinningSystem> system = SkinningSystem::create(broken);
+    const Result<SceneRecorder> system = SceneRecorder::create(context(), broken);
     ASSERT_FALSE(system.ok()) << field;
     EXPECT_EQ(system.error().code, ErrorCode::invalidArgument) << field;
     EXPECT_NE(system.error().message.find(field), std::string::npos) << system.error().message;
   }
-  SkinningSystemDescription large = description();
-  large.meshCapacity = Capacity::fixed(context().limits().maxStorageBufferRange + 4096);
-  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshCapacity");
+  SceneRecorderDescription large = description();
+  large.scene.meshCapacity = Capacity::fixed(context().limits().maxStorageBufferRange + 4096);
+  expectRefused(SceneRecorder::create(context(), large), ErrorCode::limitExceeded, "meshCapacity");
   // Sizes that no integer holds.
-  large.meshCapacity = Capacity::fixed(std::numeric_limits<std::uint64_t>::max());
-  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "meshCapacity");
+  large.scene.meshCapacity = Capacity::fixed(std::numeric_limits<std::uint64_t>::max());
+  expectRefused(SceneRecorder::create(context(), large), ErrorCode::limitExceeded, "meshCapacity");
   large = description();
-  large.framesInFlight = std::numeric_limits<std::uint32_t>::max();
-  large.jointCapacity = Capacity::fixed(large.framesInFlight);
-  expectRefused(SkinningSystem::create(large), ErrorCode::limitExceeded, "framesInFlight");
+  large.scene.framesInFlight = std::numeric_limits<std::uint32_t>::max();
+  large.scene.jointCapacity = Capacity::fixed(large.scene.framesInFlight);
+  expectRefused(SceneRecorder::create(context(), large), ErrorCode::limitExceeded,
+                "framesInFlight");
 }
 
 // The context may move to another place while a system lives, which goes on to make bindings and
@@ -349,9 +351,8 @@ TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
 TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
   std::optional<vulkan::Context> second;  // outlives the system
   std::optional<vulkan::Context> first = must(vulkan::Context::create(device().description()));
-  SkinningSystemDescription own = description();
-  own.context = &*first;
-  SystemEngine engine(device(), own);
+  SceneRecorderDescription own = description();
+  SystemEngine engine(device(), *first, own);
   engine.begin();
   InstanceDescription instance;
   instance.layout = plainLayout();
@@ -365,7 +366,7 @@ TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
   // So many that new tables are needed.
   engine.begin();
   instance.culledOnGpu = true;
-  must(engine->prepare(pipelineNeeds(instance)));
+  must(engine.recorder().prepare(instance));
   instance.culledOnGpu = false;
   while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
   engine.submit();
@@ -379,9 +380,8 @@ TEST_F(SystemHandlesTest, TheContextMayBeMoved) {
 TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   // A context of its own, which has no pipelines yet.
   vulkan::Context fresh = must(vulkan::Context::create(device().description()));
-  SkinningSystemDescription own = description();
-  own.context = &fresh;
-  SystemEngine unprepared(device(), own);
+  SceneRecorderDescription own = description();
+  SystemEngine unprepared(device(), fresh, own);
   unprepared.begin();
   InstanceDescription instance = one_->description;
   instance.mesh = unprepared.addMesh(one_->packed);
@@ -389,7 +389,7 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   const InstanceHandle handle = must(unprepared->addInstance(instance));
   expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared,
                 "call Context::prepare for it first");
-  must(unprepared->prepare(pipelineNeeds(instance)));
+  must(unprepared.recorder().prepare(instance));
   unprepared.runFrame();
   EXPECT_EQ(unprepared.lastFrame().skinnedInstances, 1u);
   EXPECT_TRUE(unprepared.read(handle) == alone(one_->packed, systemPose(2), instance));
@@ -397,13 +397,13 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
 }
 
 TEST_F(SystemHandlesTest, ASystemCanBeMoved) {
-  SkinningSystem first = must(SkinningSystem::create(description()));
-  const PoseHandle palette = must(first.addPose(4));
-  SkinningSystem second = std::move(first);
-  must(second.beginFrame(1, 0));
-  EXPECT_EQ(must(second.writePose(palette)).size(), 4u);
-  second = must(SkinningSystem::create(description()));
-  expectInvalid(second.removePose(palette), "belongs to another system");
+  SceneRecorder first = must(SceneRecorder::create(context(), description()));
+  const PoseHandle palette = must(first.scene().addPose(4));
+  SceneRecorder second = std::move(first);
+  must(second.scene().beginFrame(1, 0));
+  EXPECT_EQ(must(second.scene().writePose(palette)).size(), 4u);
+  second = must(SceneRecorder::create(context(), description()));
+  expectInvalid(second.scene().removePose(palette), "belongs to another system");
 }
 
 }  // namespace

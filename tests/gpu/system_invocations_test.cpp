@@ -35,9 +35,8 @@ class SystemInvocationsTest : public SystemVisibilityTest {
     SystemVisibilityTest::TearDown();
   }
   void openCounting(bool culledOnGpu) {
-    vulkan::SkinningSystemDescription counted = description();
-    counted.context = &counting_->context;
-    open(*counting_->device, counted, culledOnGpu, plainLayout());
+    vulkan::SceneRecorderDescription counted = description();
+    open(*counting_->device, counting_->context, counted, culledOnGpu, plainLayout());
     engine_->beforeRecord = [this](VkCommandBuffer commandBuffer) {
       functions().CmdResetQueryPool(commandBuffer, pool_, 0, 1);
       functions().CmdBeginQuery(commandBuffer, pool_, 0, 0);

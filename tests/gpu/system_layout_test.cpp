@@ -129,7 +129,7 @@ TEST_F(SystemLayoutTest, WholeWordsStandWhereTheLayoutSays) {
       layoutOf(float16x4, snorm8x4, octahedral16x2, Arrangement::interleaved, 48),
       layoutOf(snorm16x4, float16x4, none, Arrangement::planar),
   };
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
   expectOutput(engine);
 }
@@ -146,14 +146,14 @@ TEST_F(SystemLayoutTest, AttributesOfHalfWordsShareWords) {
   for (VertexLayout& layout : layouts) {
     if (formatSize(layout.positions) % 4 != 0) layout.motion = Motion::none;
   }
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
   expectOutput(engine);
 }
 
 // Positions in snorm16 are relative to the instance's own box.
 TEST_F(SystemLayoutTest, EachInstanceHasABoxOfItsOwn) {
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   engine.begin();
   palette_ = engine.addPose(pose_);
   InstanceDescription instance;
@@ -173,7 +173,7 @@ TEST_F(SystemLayoutTest, EachInstanceHasABoxOfItsOwn) {
 TEST_F(SystemLayoutTest, TheEnginesOwnAttributesStay) {
   const VertexLayout layouts[] = {layoutOf(VertexFormat::float32x3, VertexFormat::float32x3,
                                            VertexFormat::none, Arrangement::interleaved, 64)};
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
   engine.finish();
   engine.fillOutput(poison);

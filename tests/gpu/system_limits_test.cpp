@@ -99,12 +99,11 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
       small.changeLimits(
           [](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = 256 << 10; });
       vulkan::Context narrow = must(vulkan::Context::create(small.description()));
-      vulkan::SkinningSystemDescription system = description();
-      system.context = &narrow;
-      system.meshCapacity = Capacity::fixed(192 << 10);
-      system.jointCapacity = Capacity::fixed(1024);
-      system.outputCapacity = Capacity::fixed(2 << 20);
-      SystemEngine engine(device(), system);
+      vulkan::SceneRecorderDescription system = description();
+      system.scene.meshCapacity = Capacity::fixed(192 << 10);
+      system.scene.jointCapacity = Capacity::fixed(1024);
+      system.scene.outputCapacity = Capacity::fixed(2 << 20);
+      SystemEngine engine(device(), narrow, system);
       engine.begin();
       VertexLayout layout = motionLayout();
       layout.arrangement = arrangement;
@@ -122,12 +121,12 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
 TEST_F(SystemLimitsTest, OutputLargerThanTheDevicesRange) {
   const std::uint64_t range = context().limits().maxStorageBufferRange;
   if (range > std::uint64_t{256} << 20) GTEST_SKIP() << "it would take too much memory";
-  vulkan::SkinningSystemDescription large = description();
-  large.outputCapacity = Capacity::fixed(range + range / 2);
+  vulkan::SceneRecorderDescription large = description();
+  large.scene.outputCapacity = Capacity::fixed(range + range / 2);
   const std::uint32_t vertexCount = 200'000;
   const PackedMesh packed = systemMesh(3, vertexCount, 8, 1);
-  large.meshCapacity = Capacity::fixed(packed.bytes().size() + 4096);
-  SystemEngine engine(device(), large);
+  large.scene.meshCapacity = Capacity::fixed(packed.bytes().size() + 4096);
+  SystemEngine engine(device(), context(), large);
   engine.begin();
   InstanceDescription instance;
   instance.layout = plainLayout();
@@ -135,7 +134,7 @@ TEST_F(SystemLimitsTest, OutputLargerThanTheDevicesRange) {
   instance.pose = engine.addPose(systemPose(1));
   std::vector<InstanceHandle> instances;
   const std::uint64_t size = std::uint64_t{vertexCount} * 24;
-  while ((instances.size() + 1) * size <= large.outputCapacity.initial)
+  while ((instances.size() + 1) * size <= large.scene.outputCapacity.initial)
     instances.push_back(engine.addInstance(instance));
   engine.submit();
   EXPECT_EQ(engine.lastFrame().skinnedInstances, instances.size());
@@ -155,20 +154,19 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuReachesEveryRange) {
   small.changeLimits(
       [](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = 256 << 10; });
   vulkan::Context narrow = must(vulkan::Context::create(small.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &narrow;
-  system.meshCapacity = Capacity::fixed(192 << 10);
-  system.jointCapacity = Capacity::fixed(1024);
-  system.outputCapacity = Capacity::fixed(600 * 70 * 24 + (1 << 16));
-  SystemEngine engine(device(), system);
+  vulkan::SceneRecorderDescription system = description();
+  system.scene.meshCapacity = Capacity::fixed(192 << 10);
+  system.scene.jointCapacity = Capacity::fixed(1024);
+  system.scene.outputCapacity = Capacity::fixed(600 * 70 * 24 + (1 << 16));
+  SystemEngine engine(device(), narrow, system);
   engine.begin();
   expectCulledCrowd(engine, 600);
 }
 
 TEST_F(SystemLimitsTest, CullingOnTheGpuNeedsNoInstancesAtFirst) {
-  vulkan::SkinningSystemDescription system = description();
-  system.instanceCapacity = {0};
-  SystemEngine engine(device(), system);
+  vulkan::SceneRecorderDescription system = description();
+  system.scene.instanceCapacity = {0};
+  SystemEngine engine(device(), context(), system);
   engine.begin();
   expectCulledCrowd(engine, 5);
 }
@@ -178,10 +176,9 @@ TEST_F(SystemLimitsTest, WorkgroupsAreFoldedWhereADimensionIsShort) {
   small.changeLimits(
       [](VkPhysicalDeviceLimits& limits) { limits.maxComputeWorkGroupCount[0] = 13; });
   vulkan::Context narrow = must(vulkan::Context::create(small.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &narrow;
+  vulkan::SceneRecorderDescription system = description();
   system.tuning = Tuning{32, 1};  // more than 13 workgroups in each dispatch
-  SystemEngine engine(device(), system);
+  SystemEngine engine(device(), narrow, system);
   engine.begin();
   addCrowd(engine, 30, motionLayout());
   engine.submit();
@@ -200,10 +197,9 @@ TEST_F(SystemLimitsTest, CullingOnTheGpuCountsWorkgroupsOnEveryDevice) {
       limits.maxComputeWorkGroupCount[0] = limits.maxComputeWorkGroupCount[1] = most;
     });
     vulkan::Context patchedContext = must(vulkan::Context::create(patched.description()));
-    vulkan::SkinningSystemDescription system = description();
-    system.context = &patchedContext;
+    vulkan::SceneRecorderDescription system = description();
     system.tuning = Tuning{32, 1};
-    SystemEngine engine(device(), system);
+    SystemEngine engine(device(), patchedContext, system);
     engine.begin();
     expectCulledCrowd(engine, 20);
     engine.begin();
@@ -219,9 +215,8 @@ TEST_F(SystemLimitsTest, FourStorageBuffersAreEnough) {
     small.changeLimits(
         [](VkPhysicalDeviceLimits& limits) { limits.maxPerStageDescriptorStorageBuffers = 4; });
     vulkan::Context narrow = must(vulkan::Context::create(small.description()));
-    vulkan::SkinningSystemDescription system = description();
-    system.context = &narrow;
-    SystemEngine engine(device(), system);
+    vulkan::SceneRecorderDescription system = description();
+    SystemEngine engine(device(), narrow, system);
     engine.begin();
     crowd_.clear();
     addCrowd(engine, 20, motionLayout());
@@ -238,7 +233,7 @@ TEST_F(SystemLimitsTest, FourStorageBuffersAreEnough) {
 }
 
 TEST_F(SystemLimitsTest, RunsThatAreNotWholeWordsAreRefused) {
-  SingleInstance one(device(), description(), plainLayout());
+  SingleInstance one(device(), context(), description(), plainLayout());
   InstanceDescription halves = one.description;
   halves.layout.positions = VertexFormat::float16x3;
   const Result<InstanceHandle> refused = one.engine->addInstance(halves);
@@ -251,7 +246,7 @@ TEST_F(SystemLimitsTest, RunsThatAreNotWholeWordsAreRefused) {
 TEST_F(SystemLimitsTest, DescriptorsWithoutPushing) {
   useDevice(false);
   if (device_ == nullptr) return;
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   engine.begin();
   addCrowd(engine, 30, motionLayout());
   engine.submit();
@@ -264,9 +259,9 @@ TEST_F(SystemLimitsTest, DescriptorsWithoutPushing) {
 
 TEST_F(SystemLimitsTest, AnyTuningGivesTheSameBits) {
   for (const Tuning tuning : {Tuning{8, 1}, Tuning{32, 5, 1000}, Tuning{128, 16}}) {
-    vulkan::SkinningSystemDescription system = description();
+    vulkan::SceneRecorderDescription system = description();
     system.tuning = tuning;
-    SystemEngine engine(device(), system);
+    SystemEngine engine(device(), context(), system);
     engine.begin();
     crowd_.clear();
     addCrowd(engine, 20, motionLayout());
@@ -281,15 +276,14 @@ TEST_F(SystemLimitsTest, StatisticsCountTheCommandsThatThereAre) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &watched;
-  SystemEngine engine(device(), system);
+  vulkan::SceneRecorderDescription system = description();
+  SystemEngine engine(device(), watched, system);
   for (int frame = 0; frame < 4; ++frame) {
     engine.begin();
     if (frame % 2 == 0) addCrowd(engine, 10, motionLayout());
     log.calls.clear();
     engine.submit();
-    const vulkan::FrameStatistics statistics = engine.lastFrame();
+    const LastFrame statistics = engine.lastFrame();
     EXPECT_EQ(statistics.dispatches,
               log.count("vkCmdDispatch") + log.count("vkCmdDispatchIndirect"));
     EXPECT_EQ(statistics.copies, log.count("vkCmdCopyBuffer"));

@@ -14,7 +14,7 @@ namespace dermis::test {
 namespace {
 
 using vulkan::BufferUse;
-using vulkan::SkinningSystem;
+using vulkan::SceneRecorder;
 
 class SystemMemoryTest : public SystemTest {
  protected:
@@ -48,21 +48,21 @@ TEST_F(SystemMemoryTest, NewMemoryIsNotZero) {
   device().functions().GetPhysicalDeviceMemoryProperties(device().physicalDevice(), &memory);
   if ((memory.memoryTypes[0].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT) == 0)
     GTEST_SKIP() << "the CPU cannot write all of it";
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   const std::vector<std::byte> bytes = engine.readOutput();
   EXPECT_TRUE(std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0xa5}; }));
 }
 
 TEST_F(SystemMemoryTest, AllThatTheEngineGivesComesBack) {
   CountingMemory memory(device());
-  vulkan::SkinningSystemDescription own = description();
+  vulkan::SceneRecorderDescription own = description();
   own.buffers = memory.callbacks();
   {
-    SystemEngine engine(device(), own);
-    EXPECT_GE(memory.bytes, own.meshCapacity.initial + own.outputCapacity.initial)
+    SystemEngine engine(device(), context(), own);
+    EXPECT_GE(memory.bytes, own.scene.meshCapacity.initial + own.scene.outputCapacity.initial)
         << "taken when it is made";
     use(engine);
-    EXPECT_EQ(engine->statistics().deviceMemory, memory.bytes);
+    EXPECT_EQ(engine.recorder().statistics().deviceMemory, memory.bytes);
   }
   EXPECT_GT(memory.allocations, 0u);
   EXPECT_EQ(memory.allocations, memory.frees);
@@ -80,11 +80,10 @@ TEST_F(SystemMemoryTest, AllocatorsThatFailLeaveNothingBehind) {
   for (std::uint32_t failsAt = 0; !succeeded && failsAt < 100; ++failsAt) {
     CountingMemory memory(device());
     memory.failsAt = failsAt;
-    vulkan::SkinningSystemDescription own = description();
-    own.context = &watched;
+    vulkan::SceneRecorderDescription own = description();
     own.buffers = memory.callbacks();
     {
-      const Result<SkinningSystem> system = SkinningSystem::create(own);
+      const Result<SceneRecorder> system = SceneRecorder::create(watched, own);
       succeeded = system.ok();
       if (!succeeded) {
         EXPECT_EQ(system.error().code, ErrorCode::ioError);
@@ -103,13 +102,12 @@ TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &watched;
+  vulkan::SceneRecorderDescription system = description();
   system.measuresGpuTime = true;
   for (const char* function : {"vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMemory",
                                "vkMapMemory", "vkCreateQueryPool"}) {
     log.failures = {{function, VK_ERROR_OUT_OF_DEVICE_MEMORY}};
-    const Result<SkinningSystem> made = SkinningSystem::create(system);
+    const Result<SceneRecorder> made = SceneRecorder::create(watched, system);
     ASSERT_FALSE(made.ok()) << function;
     EXPECT_EQ(made.error().code, ErrorCode::vulkanError) << function;
     EXPECT_EQ(made.error().vulkanResult, VK_ERROR_OUT_OF_DEVICE_MEMORY) << function;
@@ -118,18 +116,18 @@ TEST_F(SystemMemoryTest, VulkanCallsThatFailLeaveNothingBehind) {
     EXPECT_EQ(log.allocationsAlive, 0) << function;
   }
   log.failures.clear();
-  EXPECT_TRUE(SkinningSystem::create(system).ok());
+  EXPECT_TRUE(SceneRecorder::create(watched, system).ok());
 }
 
 TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   static int destroyed;
   destroyed = 0;
-  vulkan::SkinningSystemDescription own = description();
+  vulkan::SceneRecorderDescription own = description();
   own.buffers.create = [](void*, const vulkan::BufferRequest&) {
     return Result(vulkan::CreatedBuffer{});
   };
   own.buffers.destroy = [](void*, const vulkan::CreatedBuffer&) { ++destroyed; };
-  const Result<SkinningSystem> system = SkinningSystem::create(own);
+  const Result<SceneRecorder> system = SceneRecorder::create(context(), own);
   ASSERT_FALSE(system.ok());
   EXPECT_NE(system.error().message.find("returned no buffer for 'dermis "), std::string::npos)
       << system.error().message;
@@ -144,10 +142,9 @@ TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
   CountingMemory memory(device());
-  vulkan::SkinningSystemDescription own = description();
-  own.context = &watched;
+  vulkan::SceneRecorderDescription own = description();
   own.buffers = memory.callbacks();
-  SystemEngine engine(device(), own);
+  SystemEngine engine(device(), watched, own);
   const PackedMesh packed = systemMesh(1, 20);
   engine.begin();
   InstanceDescription instance;
@@ -160,7 +157,7 @@ TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   engine.writePose(instance.pose, systemPose(2));
   while (instances.size() < 3000) instances.push_back(must(engine->addInstance(instance)));
   const std::uint32_t before = memory.allocations;
-  for (std::uint32_t failed = 0; failed < 3; ++failed) {
+  for (std::uint32_t failed = 0; failed < 2; ++failed) {
     memory.failsAt = before + failed;
     log.calls.clear();
     const Result<void> recorded = engine.trySubmit();
@@ -173,7 +170,7 @@ TEST_F(SystemMemoryTest, AFrameWithoutMemoryIsTriedAgain) {
   }
   memory.failsAt = ~0u;
   engine.submit();
-  EXPECT_EQ(memory.allocations, before + 3) << "what the failed frames took was kept";
+  EXPECT_EQ(memory.allocations, before + 2) << "what the failed frames took was kept";
   EXPECT_EQ(engine.lastFrame().skinnedInstances, 3000u);
   const std::vector<std::byte> bytes = engine.readOutput();
   const Streams expected = alone(packed, systemPose(2), instance);
@@ -185,15 +182,14 @@ TEST_F(SystemMemoryTest, MemoryOfItsOwnIsTakenInFewBlocks) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &watched;
+  vulkan::SceneRecorderDescription system = description();
   {
-    SystemEngine engine(device(), system);
+    SystemEngine engine(device(), watched, system);
     use(engine);
     EXPECT_LE(log.count("vkAllocateMemory"), 6u);
-    EXPECT_LE(engine->statistics().deviceMemory, log.allocatedBytes);
-    EXPECT_GE(engine->statistics().deviceMemory,
-              system.meshCapacity.initial + system.outputCapacity.initial);
+    EXPECT_LE(engine.recorder().statistics().deviceMemory, log.allocatedBytes);
+    EXPECT_GE(engine.recorder().statistics().deviceMemory,
+              system.scene.meshCapacity.initial + system.scene.outputCapacity.initial);
   }
   EXPECT_EQ(log.buffersAlive, 0);
   EXPECT_EQ(log.allocationsAlive, 0);
@@ -203,9 +199,8 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &watched;
-  SystemEngine engine(device(), system);
+  vulkan::SceneRecorderDescription system = description();
+  SystemEngine engine(device(), watched, system);
   const PackedMesh packed = systemMesh(1, 100);
   std::uint32_t allocations = 0;
   for (int round = 0; round < 60; ++round) {
@@ -227,7 +222,7 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
   EXPECT_EQ(log.count("vkAllocateMemory"), allocations);
   engine.runFrame();
   engine.begin();
-  const vulkan::SystemStatistics statistics = engine->statistics();
+  const SceneStatistics statistics = engine->statistics();
   EXPECT_EQ(statistics.meshes.used, 0u);
   EXPECT_EQ(statistics.palettes.used, 0u);
   EXPECT_EQ(statistics.outputs.used, 0u);
@@ -236,8 +231,8 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
 }
 
 TEST_F(SystemMemoryTest, StatisticsAddUp) {
-  SingleInstance one(device(), description(), motionLayout());
-  const vulkan::SystemStatistics statistics = one.engine->statistics();
+  SingleInstance one(device(), context(), description(), motionLayout());
+  const SceneStatistics statistics = one.engine->statistics();
   EXPECT_EQ(statistics.meshes.used, one.packed.bytes().size());
   EXPECT_EQ(statistics.outputs.used, 100u * 36);
   EXPECT_GE(statistics.outputs.capacity, 4u << 20);

@@ -13,7 +13,7 @@ class SystemMotionTest : public SystemTest {
  protected:
   void SetUp() override {
     SystemTest::SetUp();
-    if (device_ != nullptr) one_.emplace(device(), description(), motionLayout());
+    if (device_ != nullptr) one_.emplace(device(), context(), description(), motionLayout());
   }
   void TearDown() override {
     one_.reset();
@@ -304,7 +304,7 @@ class SystemIntervalTest : public SystemTest {};
 
 // A body and its clothes rest until the face alone moves: whatever follows, they show one pose.
 TEST_F(SystemIntervalTest, InstancesOfAPoseKeepTogetherWhenOneChangesAlone) {
-  SingleInstance body(device(), description(), plainLayout());
+  SingleInstance body(device(), context(), description(), plainLayout());
   body.description.updateInterval = 4;
   must(body.engine->change({.instance = body.instance, .updateInterval = 4}));
   const InstanceHandle clothes = body.engine.addInstance(body.description);
@@ -329,7 +329,7 @@ TEST_F(SystemIntervalTest, InstancesOfAPoseKeepTogetherWhenOneChangesAlone) {
 // Whatever the beat of its interval, and whether its pose is written before or after it is shown.
 TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
   for (const bool poseFirst : {true, false}) {
-    SingleInstance one(device(), description(), motionLayout());
+    SingleInstance one(device(), context(), description(), motionLayout());
     must(one.engine->change({.instance = one.instance, .updateInterval = 5}));
     one.engine.submit();
     for (std::uint32_t away = 1; away <= 10; ++away) {
@@ -351,7 +351,7 @@ TEST_F(SystemIntervalTest, WhatComesBackIntoViewDoesNotWaitForTheInterval) {
 }
 
 TEST_F(SystemIntervalTest, PosesAreSpreadOverTheFramesAndTheirInstancesKeepTogether) {
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   engine.begin();
   const MeshHandle mesh = engine.addMesh(systemMesh(1, 20));
   std::vector<PoseHandle> palettes;

@@ -16,16 +16,17 @@ constexpr std::uint32_t meshCount = 20;
 class SystemOutputTest : public SystemTest {
  protected:
   VkBufferUsageFlags outputUsage() {
-    return must(vulkan::SkinningSystem::requirement(description(), BufferRole::positions)).usage;
+    return must(vulkan::SceneRecorder::requirement(context(), description(), BufferRole::positions))
+        .usage;
   }
 };
 
 TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
-  vulkan::SkinningSystemDescription large = description();
-  large.outputCapacity = Capacity::fixed(32 << 20);
-  large.jointCapacity = Capacity::fixed(10'000 * 4);
-  large.instanceCapacity = Capacity::fixed(10'000);
-  SystemEngine engine(device(), large);
+  vulkan::SceneRecorderDescription large = description();
+  large.scene.outputCapacity = Capacity::fixed(32 << 20);
+  large.scene.jointCapacity = Capacity::fixed(10'000 * 4);
+  large.scene.instanceCapacity = Capacity::fixed(10'000);
+  SystemEngine engine(device(), context(), large);
   engine.begin();
   std::vector<MeshHandle> meshes;
   for (std::uint32_t mesh = 0; mesh < meshCount; ++mesh)
@@ -60,11 +61,11 @@ TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   constexpr std::uint64_t whole = 1 << 18, begin = 65 * 192, size = 92'000;
   samples::MappedBuffer buffer =
       must(samples::MappedBuffer::create(device(), whole, outputUsage()));
-  vulkan::SkinningSystemDescription ranged = description();
+  vulkan::SceneRecorderDescription ranged = description();
   ranged.output = {buffer.handle(), begin, size};
-  ranged.outputCapacity = Capacity::fixed(whole);  // what the test reads
-  SystemEngine engine(device(), ranged);
-  EXPECT_EQ(engine->outputBuffer(), buffer.handle());
+  ranged.scene.outputCapacity = Capacity::fixed(whole);  // what the test reads
+  SystemEngine engine(device(), context(), ranged);
+  EXPECT_EQ(engine.recorder().outputBuffer(), buffer.handle());
   EXPECT_EQ(engine->statistics().outputs.capacity, size);
   engine.fillOutput(std::byte{0x5a});
   engine.begin();
@@ -112,9 +113,9 @@ TEST_F(SystemOutputTest, RangesThatMakeNoSenseAreRefused) {
        {vulkan::BufferRange{buffer.handle(), 0, 0}, vulkan::BufferRange{buffer.handle(), 0, 1026},
         vulkan::BufferRange{buffer.handle(), alignment + 1, 1024},
         vulkan::BufferRange{VK_NULL_HANDLE, 0, 1024}}) {
-    vulkan::SkinningSystemDescription ranged = description();
+    vulkan::SceneRecorderDescription ranged = description();
     ranged.output = bad;
-    const Result<vulkan::SkinningSystem> system = vulkan::SkinningSystem::create(ranged);
+    const Result<vulkan::SceneRecorder> system = vulkan::SceneRecorder::create(context(), ranged);
     ASSERT_FALSE(system.ok());
     EXPECT_EQ(system.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(system.error().message.find("::output "), std::string::npos)
@@ -123,11 +124,11 @@ TEST_F(SystemOutputTest, RangesThatMakeNoSenseAreRefused) {
 }
 
 TEST_F(SystemOutputTest, NothingIsRecordedWhereNothingChanged) {
-  SingleInstance one(device(), description(), motionLayout());
+  SingleInstance one(device(), context(), description(), motionLayout());
   one.engine.submit();
   one.engine.runFrame();  // it comes to rest, at the latest
   one.engine.runFrame();
-  const vulkan::FrameStatistics frame = one.engine.lastFrame();
+  const LastFrame frame = one.engine.lastFrame();
   EXPECT_EQ(frame.frame, 3u);
   EXPECT_EQ(frame.instances, 1u);
   EXPECT_EQ(frame.dispatches, 0u);
@@ -143,7 +144,7 @@ TEST_F(SystemOutputTest, NothingIsRecordedWhereNothingChanged) {
 }
 
 TEST_F(SystemOutputTest, APoseThatManyMeshesShareIsConvertedOnce) {
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   engine.begin();
   const Pose first = systemPose(1), second = systemPose(2);
   const PoseHandle shared = engine.addPose(first), own = engine.addPose(second);
@@ -172,7 +173,7 @@ TEST_F(SystemOutputTest, APoseThatManyMeshesShareIsConvertedOnce) {
 }
 
 TEST_F(SystemOutputTest, AnUnwrittenPoseIsTheIdentity) {
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   const PackedMesh packed = systemMesh(1, 100);
   InstanceDescription instance;
   instance.layout = plainLayout();
@@ -184,7 +185,7 @@ TEST_F(SystemOutputTest, AnUnwrittenPoseIsTheIdentity) {
 }
 
 TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
-  SystemEngine engine(device(), description());
+  SystemEngine engine(device(), context(), description());
   engine.begin();
   const PackedMesh packed = systemMesh(1, 100);
   const Pose pose = randomPose(1, 8, Rigidity::shear);
@@ -204,7 +205,7 @@ TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
 TEST_F(SystemOutputTest, MorphWeightsAreThoseThatWereSetLast) {
   VertexLayout layout = plainLayout();
   layout.tangents = VertexFormat::float32x4;
-  SingleInstance one(device(), description(), layout);
+  SingleInstance one(device(), context(), description(), layout);
   const std::vector<MorphWeight> smile{{0, 0.5f}, {2, 0.25f}}, frown{{1, 1.0f}};
   must(one.engine->change({.instance = one.instance, .morphs = frown}));
   must(one.engine->change({.instance = one.instance, .morphs = smile}));
@@ -223,7 +224,7 @@ TEST_F(SystemOutputTest, MorphWeightsAreThoseThatWereSetLast) {
 }
 
 TEST_F(SystemOutputTest, BoundsAreThoseOfTheNewestCompleteFrame) {
-  SingleInstance one(device(), description(), plainLayout());
+  SingleInstance one(device(), context(), description(), plainLayout());
   InstanceDescription bounded = one.description;
   bounded.bounds = true;
   const InstanceHandle instance = one.engine.addInstance(bounded);
@@ -263,7 +264,7 @@ TEST_F(SystemOutputTest, BoundsAreThoseOfTheNewestCompleteFrame) {
 
 // The frame with the box and an idle one become complete together.
 TEST_F(SystemOutputTest, BoxesAreNotLostWhereTheNextFrameDoesNothing) {
-  SingleInstance one(device(), description(), plainLayout());
+  SingleInstance one(device(), context(), description(), plainLayout());
   InstanceDescription bounded = one.description;
   bounded.bounds = true;
   const InstanceHandle instance = one.engine.addInstance(bounded);

@@ -17,9 +17,9 @@ class SystemOverflowTest : public SystemTest {
   /// Room for so many instances and a half.
   void open(std::uint32_t instances) {
     if (device_ == nullptr) return;
-    vulkan::SkinningSystemDescription small = description();
-    small.outputCapacity = Capacity::fixed(instances * instanceSize + instanceSize / 2);
-    engine_.emplace(device(), small);
+    vulkan::SceneRecorderDescription small = description();
+    small.scene.outputCapacity = Capacity::fixed(instances * instanceSize + instanceSize / 2);
+    engine_.emplace(device(), context(), small);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);
     instance_.layout = motionLayout();
@@ -28,12 +28,12 @@ class SystemOverflowTest : public SystemTest {
     engine_.reset();
     SystemTest::TearDown();
   }
-  vulkan::SkinningSystem& system() { return engine_->system(); }
+  Scene& scene() { return engine_->scene(); }
 
   Result<InstanceHandle> tryAdd(std::uint32_t pose) {
     instance_.pose = palettes_.emplace_back(engine_->addPose(systemPose(pose)));
-    must(system().prepare(pipelineNeeds(instance_)));
-    return system().addInstance(instance_);
+    must(engine_->recorder().prepare(instance_));
+    return scene().addInstance(instance_);
   }
   InstanceHandle add(std::uint32_t pose) { return must(tryAdd(pose)); }
   /// A frame in which every pose is written again, shifted by so much.
@@ -67,7 +67,7 @@ TEST_F(SystemOverflowTest, RefusedIsAsIfItHadNotBeenAskedFor) {
   EXPECT_EQ(engine_->lastFrame().instances, 2u);
   expectPose(first, packed_, 0, 0);
   expectPose(second, packed_, 1, 1);
-  must(system().removePose(palettes_[2]));
+  must(scene().removePose(palettes_[2]));
 }
 
 TEST_F(SystemOverflowTest, RoomIsGivenBackOnceTheFrameIsComplete) {
@@ -75,9 +75,9 @@ TEST_F(SystemOverflowTest, RoomIsGivenBackOnceTheFrameIsComplete) {
   const InstanceHandle first = add(0);
   add(1);
   engine_->submit();
-  const std::uint64_t place = must(system().output(first)).offset;
+  const std::uint64_t place = must(scene().output(first)).offset;
   engine_->begin(1);
-  must(system().removeInstance(first));
+  must(scene().removeInstance(first));
   EXPECT_FALSE(tryAdd(2).ok()) << "the frame before still reads it";
   engine_->submit();
   engine_->begin(1);
@@ -86,7 +86,7 @@ TEST_F(SystemOverflowTest, RoomIsGivenBackOnceTheFrameIsComplete) {
   engine_->begin(1);
   const InstanceHandle third = add(4);
   engine_->submit();
-  EXPECT_EQ(must(system().output(third)).offset, place);
+  EXPECT_EQ(must(scene().output(third)).offset, place);
   expectPose(third, packed_, 4, 4);
 }
 
@@ -97,35 +97,35 @@ TEST_F(SystemOverflowTest, AMeshThatIsRefusedLeavesTheOldOne) {
   engine_->submit();
   engine_->begin();
   const MeshHandle dense = engine_->addMesh(systemMesh(2, 150));
-  const Result<void> changed = system().change({.instance = first, .mesh = dense});
+  const Result<void> changed = scene().change({.instance = first, .mesh = dense});
   ASSERT_FALSE(changed.ok());
   EXPECT_EQ(changed.error().code, ErrorCode::limitExceeded);
-  must(system().removeMesh(dense));
+  must(scene().removeMesh(dense));
   engine_->submit();
   moveAll(10);
-  EXPECT_EQ(must(system().output(first)).mesh, instance_.mesh);
+  EXPECT_EQ(must(scene().output(first)).mesh, instance_.mesh);
   expectPose(first, packed_, 10, 0);
 }
 
 // The kernel that chooses instances reads a word for each index, and keeps a record for it.
 TEST_F(SystemOverflowTest, NoVisibilityIndexReachesTheInstanceBudget) {
-  vulkan::SkinningSystemDescription small = description();
-  small.instanceCapacity = Capacity::fixed(3);
-  engine_.emplace(device(), small);
+  vulkan::SceneRecorderDescription small = description();
+  small.scene.instanceCapacity = Capacity::fixed(3);
+  engine_.emplace(device(), context(), small);
   engine_->begin();
   instance_.layout = motionLayout();
   instance_.culledOnGpu = true;
   std::vector<InstanceHandle> added;
-  for (std::uint32_t i = 0; i < small.instanceCapacity.initial; ++i) {
+  for (std::uint32_t i = 0; i < small.scene.instanceCapacity.initial; ++i) {
     instance_.mesh = engine_->addMesh(packed_);
     added.push_back(add(i));
-    EXPECT_LT(must(system().visibilityIndex(added.back())), system().visibilityCount());
+    EXPECT_LT(must(scene().visibilityIndex(added.back())), scene().visibilityCount());
   }
   const Result<InstanceHandle> further = tryAdd(9);
   ASSERT_FALSE(further.ok());
   EXPECT_EQ(further.error().code, ErrorCode::limitExceeded);
   samples::MappedBuffer words = must(samples::MappedBuffer::create(
-      device(), small.instanceCapacity.initial * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+      device(), small.scene.instanceCapacity.initial * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::memset(words.bytes().data(), 1, words.bytes().size());
   engine_->submit({words.handle(), 0});
   for (std::uint32_t i = 0; i < added.size(); ++i) expectPose(added[i], packed_, i, i);
@@ -140,11 +140,11 @@ TEST_F(SystemOverflowTest, AFailedRecordChangesNothingThatIsShown) {
   const PackedMesh other = systemMesh(2, 90);
   const MeshHandle otherHandle = engine_->addMesh(other);
   instance_.culledOnGpu = true;
-  must(system().change({.instance = first, .mesh = otherHandle}));
-  const InstanceOutput before = must(system().output(first));
+  must(scene().change({.instance = first, .mesh = otherHandle}));
+  const InstanceOutput before = must(scene().output(first));
   add(1);  // chosen by the GPU, but by what?
   ASSERT_FALSE(engine_->trySubmit().ok());
-  const InstanceOutput after = must(system().output(first));
+  const InstanceOutput after = must(scene().output(first));
   EXPECT_EQ(after.mesh, instance_.mesh);
   EXPECT_EQ(after.offset, before.offset);
   EXPECT_EQ(after.size, before.size);
@@ -158,27 +158,27 @@ TEST_F(SystemOverflowTest, ALevelOfDetailMaySwitchOftenOutOfView) {
   const MeshHandle coarseHandle = engine_->addMesh(coarse);
   engine_->submit();
   engine_->begin();
-  must(system().change({.instance = first, .visible = false}));
-  must(system().removeInstance(gap));
+  must(scene().change({.instance = first, .visible = false}));
+  must(scene().removeInstance(gap));
   engine_->submit();
   for (std::uint32_t i = 0; i < 5; ++i) {
     engine_->begin();
-    must(system().change({.instance = first, .mesh = coarseHandle}));
+    must(scene().change({.instance = first, .mesh = coarseHandle}));
     engine_->submit();
     engine_->begin();
-    must(system().change({.instance = first, .mesh = instance_.mesh}));
+    must(scene().change({.instance = first, .mesh = instance_.mesh}));
     engine_->submit();
   }
   engine_->runFrame();
   engine_->begin();
-  EXPECT_EQ(system().statistics().outputs.used, instanceSize);
-  must(system().change({.instance = first, .mesh = coarseHandle}));
-  must(system().change({.instance = first, .mesh = instance_.mesh}));
-  EXPECT_EQ(system().compact(1 << 20), instanceSize);
-  must(system().change({.instance = first, .visible = true}));
+  EXPECT_EQ(scene().statistics().outputs.used, instanceSize);
+  must(scene().change({.instance = first, .mesh = coarseHandle}));
+  must(scene().change({.instance = first, .mesh = instance_.mesh}));
+  EXPECT_EQ(scene().compact(1 << 20), instanceSize);
+  must(scene().change({.instance = first, .visible = true}));
   engine_->submit();
   EXPECT_EQ(engine_->lastFrame().movedBytes, instanceSize);
-  EXPECT_EQ(indicesOf(system().movedInstances()), std::set<std::uint32_t>{first.index});
+  EXPECT_EQ(indicesOf(scene().movedInstances()), std::set<std::uint32_t>{first.index});
   expectPose(first, packed_, 1, 1);
 }
 

@@ -133,7 +133,7 @@ TEST_F(SystemResultsTest, NothingIsReadBackOfAFrameThatIsNotComplete) {
   engine_->submitNow([](VkCommandBuffer) {});
   engine_->begin(1);
   ASSERT_EQ(engine_->completedFrame(), 1u);
-  const vulkan::GpuStatistics gpu = (*engine_)->statistics().lastCompletedFrame;
+  const CullingStatistics gpu = (*engine_)->statistics().lastCompletedFrame;
   EXPECT_EQ(gpu.frame, 1u);
   EXPECT_EQ(gpu.visibleInstances, instanceCount);
   for (std::uint32_t i = 0; i < instanceCount; ++i)
@@ -152,10 +152,9 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
   InterceptedDevice intercepted(device().description());
   CommandLog log(intercepted);
   vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = description();
-  system.context = &watched;
-  system.boundsCapacity = Capacity::fixed(count);
-  SystemEngine engine(device(), system);
+  vulkan::SceneRecorderDescription system = description();
+  system.scene.boundsCapacity = Capacity::fixed(count);
+  SystemEngine engine(device(), watched, system);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);
   instance_.layout = plainLayout();
@@ -189,10 +188,10 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
 
 // An instance that finds no room in the output gives back its slot among the results.
 TEST_F(SystemResultsTest, AnInstanceThatIsRefusedKeepsNoSlot) {
-  vulkan::SkinningSystemDescription small = description();
-  small.boundsCapacity = Capacity::fixed(2);
-  small.outputCapacity = Capacity::fixed(vertexCount * 24);
-  SystemEngine engine(device(), small);
+  vulkan::SceneRecorderDescription small = description();
+  small.scene.boundsCapacity = Capacity::fixed(2);
+  small.scene.outputCapacity = Capacity::fixed(vertexCount * 24);
+  SystemEngine engine(device(), context(), small);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);
   instance_.pose = engine.addPose(systemPose(1));

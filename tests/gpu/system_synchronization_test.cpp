@@ -46,12 +46,11 @@ class SystemSynchronizationTest : public SystemTest {
     SystemTest::TearDown();
   }
   samples::Device& strictDevice() { return *open_->device; }
-  vulkan::SkinningSystemDescription strictDescription() {
-    vulkan::SkinningSystemDescription strict = description();
-    strict.context = &open_->context;
-    strict.framesInFlight = framesInFlight;
-    strict.outputCapacity = Capacity::fixed(256 << 10);
-    strict.instanceCapacity = Capacity::fixed(1000);
+  vulkan::SceneRecorderDescription strictDescription() {
+    vulkan::SceneRecorderDescription strict = description();
+    strict.scene.framesInFlight = framesInFlight;
+    strict.scene.outputCapacity = Capacity::fixed(256 << 10);
+    strict.scene.instanceCapacity = Capacity::fixed(1000);
     return strict;
   }
 
@@ -67,16 +66,17 @@ class SystemSynchronizationTest : public SystemTest {
 /// command of its own, and copies the output as if it drew from it.
 class BusyScene {
  public:
-  BusyScene(samples::Device& device, const vulkan::SkinningSystemDescription& system)
-      : device_(device), engine_(device, system) {
+  BusyScene(samples::Device& device, const vulkan::Context& context,
+            const vulkan::SceneRecorderDescription& system)
+      : device_(device), engine_(device, context, system) {
     const VkBufferUsageFlags usage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     visibility_ =
         must(samples::MappedBuffer::create(device, engine_->visibilityCount() * 4, usage));
     for (samples::MappedBuffer& drawn : drawn_)
-      drawn =
-          must(samples::MappedBuffer::create(device, system.outputCapacity.initial, usage, true));
-    size_ = system.outputCapacity.initial;
+      drawn = must(
+          samples::MappedBuffer::create(device, system.scene.outputCapacity.initial, usage, true));
+    size_ = system.scene.outputCapacity.initial;
     instance_.layout = motionLayout();
     instance_.bounds = true;
     engine_.beforeRecord = [this](VkCommandBuffer buffer) { cull(buffer); };
@@ -108,7 +108,7 @@ class BusyScene {
   }
   void draw(VkCommandBuffer commandBuffer) {
     const VkBufferCopy all{0, 0, size_};
-    device_.functions().CmdCopyBuffer(commandBuffer, engine_->outputBuffer(),
+    device_.functions().CmdCopyBuffer(commandBuffer, engine_.recorder().outputBuffer(),
                                       drawn_[engine_.frame() % framesInFlight].handle(), 1, &all);
   }
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
@@ -120,7 +120,7 @@ class BusyScene {
     instance_.mesh = meshes_[below(meshes_.size())];
     instance_.culledOnGpu = below(2) == 0;
     instance_.method = below(2) == 0 ? Method::linear : Method::dualQuaternion;
-    must(engine_->prepare(pipelineNeeds(instance_)));
+    must(engine_.recorder().prepare(instance_));
     const Result<InstanceHandle> added = engine_->addInstance(instance_);
     if (added) instances_.push_back(*added);
   }
@@ -156,7 +156,7 @@ class BusyScene {
 };
 
 TEST_F(SystemSynchronizationTest, AHundredFramesWithThreeInFlightAreSilent) {
-  BusyScene scene(strictDevice(), strictDescription());
+  BusyScene scene(strictDevice(), open_->context, strictDescription());
   for (int frame = 0; frame < 100; ++frame) scene.runFrame();
   EXPECT_EQ(scene.mostUnderWay(), framesInFlight);
   for (const std::string& message : strictDevice().takeValidationMessages())
@@ -167,9 +167,8 @@ TEST_F(SystemSynchronizationTest, WithoutBarriersInsideACommandBufferTheLayerSpe
   InterceptedDevice intercepted(strictDevice().description());
   CommandLog log(intercepted);
   vulkan::Context forgetful = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = strictDescription();
-  system.context = &forgetful;
-  BusyScene scene(strictDevice(), system);
+  vulkan::SceneRecorderDescription system = strictDescription();
+  BusyScene scene(strictDevice(), forgetful, system);
   for (int frame = 0; frame < 5; ++frame) scene.runFrame(0);
   EXPECT_TRUE(strictDevice().takeValidationMessages().empty());
   log.forgetsBarrier = [](std::uint32_t) { return true; };
@@ -193,14 +192,13 @@ class EventfulFrames {
 
   /// Leaves out one of them. Returns whether the layer reports it.
   bool run(samples::Device& device, vulkan::Context& context, CommandLog& log,
-           vulkan::SkinningSystemDescription system, const Events& events, std::uint32_t leftOut) {
+           vulkan::SceneRecorderDescription system, const Events& events, std::uint32_t leftOut) {
     names.clear();
-    system.context = &context;
     if (events.grows) {
-      system.meshCapacity = {1024};
-      system.outputCapacity = {4096};
+      system.scene.meshCapacity = {1024};
+      system.scene.outputCapacity = {4096};
     }
-    SystemEngine engine(device, system);
+    SystemEngine engine(device, context, system);
     const VkBufferUsageFlags usage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     const samples::MappedBuffer words = must(samples::MappedBuffer::create(device, 4096, usage));
@@ -230,8 +228,8 @@ class EventfulFrames {
     engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.draws) return;
       const VkBufferCopy all{0, 0, engine->statistics().outputs.capacity};
-      device.functions().CmdCopyBuffer(commandBuffer, engine->outputBuffer(), drawn.handle(), 1,
-                                       &all);
+      device.functions().CmdCopyBuffer(commandBuffer, engine.recorder().outputBuffer(),
+                                       drawn.handle(), 1, &all);
     };
     InstanceDescription instance;
     instance.layout = motionLayout();
@@ -286,15 +284,15 @@ TEST_F(SystemSynchronizationTest, EachBarrierThatIsLeftOutIsReported) {
   using Events = EventfulFrames::Events;
   const std::string begin = "compute copy indirect to compute copy", tables = "copy to compute",
                     palettes = "compute to compute", arguments = "compute to compute indirect",
-                    toCopy = "compute to copy", beforeGrowing = "compute copy to copy",
-                    afterGrowing = "copy to compute copy", engines = "the engine's compute to copy";
+                    toCopy = "compute to copy", afterGrowing = "copy to copy",
+                    engines = "the engine's compute to copy";
   struct Case {
     Events events;
     std::set<std::string> reported;
   };
   const Case cases[] = {
-      {{}, {begin, toCopy, tables, palettes}},
-      {{.grows = true}, {begin, beforeGrowing, afterGrowing, tables, palettes}},
+      {{}, {begin, tables, palettes}},
+      {{.grows = true}, {begin, afterGrowing, tables, palettes}},
       {{.culls = true}, {begin, tables, palettes, arguments, toCopy}},
       {{.bounds = true}, {tables, palettes, toCopy}},
       {{.gpuPoses = true}, {tables, palettes, engines}},
@@ -317,13 +315,13 @@ TEST_F(SystemSynchronizationTest, EachBarrierThatIsLeftOutIsReported) {
 
 // Where the system copies nothing back, all that stands between it and who draws is the engine's.
 TEST_F(SystemSynchronizationTest, WithoutTheEnginesBarriersTheLayerSpeaks) {
-  SingleInstance one(strictDevice(), strictDescription(), motionLayout());
-  const std::uint64_t size = strictDescription().outputCapacity.initial;
+  SingleInstance one(strictDevice(), open_->context, strictDescription(), motionLayout());
+  const std::uint64_t size = strictDescription().scene.outputCapacity.initial;
   const samples::MappedBuffer drawn = must(
       samples::MappedBuffer::create(strictDevice(), size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   one.engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
     const VkBufferCopy all{0, 0, size};
-    strictDevice().functions().CmdCopyBuffer(commandBuffer, one.engine->outputBuffer(),
+    strictDevice().functions().CmdCopyBuffer(commandBuffer, one.engine.recorder().outputBuffer(),
                                              drawn.handle(), 1, &all);
   };
   one.engine.submit();
@@ -342,9 +340,8 @@ TEST_F(SystemSynchronizationTest, WithoutBarriersBetweenSubmissionsTheLayerSpeak
   InterceptedDevice intercepted(strictDevice().description());
   CommandLog log(intercepted);
   vulkan::Context forgetful = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = strictDescription();
-  system.context = &forgetful;
-  SingleInstance one(strictDevice(), system, motionLayout());
+  vulkan::SceneRecorderDescription system = strictDescription();
+  SingleInstance one(strictDevice(), forgetful, system, motionLayout());
   one.engine.recordsBarriers = false;
   one.engine.submit();
   const auto move = [&](std::uint32_t pose) {

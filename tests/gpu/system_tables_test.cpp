@@ -89,10 +89,9 @@ TEST_F(SystemTablesTest, OldTablesStayUntilTheirFramesAreComplete) {
     intercept(intercepted);
     {
       vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
-      vulkan::SkinningSystemDescription system = description();
-      system.context = &watched;
-      system.framesInFlight = framesInFlight;
-      SystemEngine engine(device(), system);
+      vulkan::SceneRecorderDescription system = description();
+      system.scene.framesInFlight = framesInFlight;
+      SystemEngine engine(device(), watched, system);
       const PackedMesh packed = systemMesh(1, 20);
       engine.begin();
       InstanceDescription instance;

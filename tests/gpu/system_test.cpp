@@ -49,14 +49,13 @@ void expectReference(const samples::SkinnedVertices& skinned, const samples::Ski
 
 }  // namespace
 
-vulkan::SkinningSystemDescription SystemTest::description() {
-  vulkan::SkinningSystemDescription description;
-  description.context = &context();
-  description.meshCapacity = Capacity::fixed(4 << 20);
-  description.jointCapacity = Capacity::fixed(4096);
-  description.instanceCapacity = Capacity::fixed(4096);
-  description.boundsCapacity = Capacity::fixed(256);
-  description.outputCapacity = Capacity::fixed(4 << 20);
+vulkan::SceneRecorderDescription SystemTest::description() {
+  vulkan::SceneRecorderDescription description;
+  description.scene.meshCapacity = Capacity::fixed(4 << 20);
+  description.scene.jointCapacity = Capacity::fixed(4096);
+  description.scene.instanceCapacity = Capacity::fixed(4096);
+  description.scene.boundsCapacity = Capacity::fixed(256);
+  description.scene.outputCapacity = Capacity::fixed(4 << 20);
   description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                             VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   return description;
@@ -85,10 +84,10 @@ void SystemTest::expectSkinned(const Streams& skinned, const Streams& expected) 
     EXPECT_TRUE(skinned[stream] == expected[stream]) << "stream " << stream;
 }
 
-SingleInstance::SingleInstance(samples::Device& device,
-                               const vulkan::SkinningSystemDescription& system,
+SingleInstance::SingleInstance(samples::Device& device, const vulkan::Context& context,
+                               const vulkan::SceneRecorderDescription& system,
                                const VertexLayout& layout, std::uint32_t vertexCount)
-    : packed(systemMesh(1, vertexCount)), engine(device, system) {
+    : packed(systemMesh(1, vertexCount)), engine(device, context, system) {
   engine.begin();
   description.mesh = engine.addMesh(packed);
   description.pose = engine.addPose(systemPose(1));

@@ -1,4 +1,4 @@
-// What the tests of SkinningSystem share: meshes, poses, and each instance skinned alone by
+// What the tests of SceneRecorder share: meshes, poses, and each instance skinned alone by
 // makePlan and `Context::record`, which is what the system must give, bit for bit. That itself is
 // held against the reference: both go through the same kernels.
 #pragma once
@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "dermis/pack.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "random_rig.h"
 #include "scene_meshes.h"
 #include "system_engine.h"
@@ -25,7 +25,7 @@ namespace dermis::test {
 class SystemTest : public DeviceTest {
  protected:
   /// Small, and with an output that the engine may copy from and fill.
-  vulkan::SkinningSystemDescription description();
+  vulkan::SceneRecorderDescription description();
 
   /// What tier 1 makes of a mesh of `systemMesh` as the only job, inside the bounds of the
   /// reference. Previous positions are the current ones.
@@ -39,8 +39,9 @@ class SystemTest : public DeviceTest {
 
 /// One mesh, one palette and one instance, in an engine.
 struct SingleInstance {
-  SingleInstance(samples::Device& device, const vulkan::SkinningSystemDescription& system,
-                 const VertexLayout& layout, std::uint32_t vertexCount = 100);
+  SingleInstance(samples::Device& device, const vulkan::Context& context,
+                 const vulkan::SceneRecorderDescription& system, const VertexLayout& layout,
+                 std::uint32_t vertexCount = 100);
 
   PackedMesh packed;
   SystemEngine engine;

@@ -55,8 +55,8 @@ void VKAPI_CALL writeTimestamp(VkCommandBuffer commandBuffer, VkPipelineStageFla
 
 class SystemTimeTest : public SystemTest {
  protected:
-  vulkan::SkinningSystemDescription measured() {
-    vulkan::SkinningSystemDescription description = this->description();
+  vulkan::SceneRecorderDescription measured() {
+    vulkan::SceneRecorderDescription description = this->description();
     description.measuresGpuTime = true;
     return description;
   }
@@ -72,16 +72,15 @@ TEST_F(SystemTimeTest, TheGpusTimeIsTicksTimesTheirPeriod) {
       device().functions().GetDeviceProcAddr(device().handle(), "vkCmdWriteTimestamp"));
   intercepted.replace("vkCmdWriteTimestamp", writeTimestamp);
   vulkan::Context context = must(vulkan::Context::create(intercepted.description()));
-  vulkan::SkinningSystemDescription system = measured();
-  system.context = &context;
-  SingleInstance one(device(), system, plainLayout());
+  vulkan::SceneRecorderDescription system = measured();
+  SingleInstance one(device(), context, system, plainLayout());
   const auto measure = [&](std::uint32_t pose) {
     one.engine.writePose(one.description.pose, systemPose(pose));
     written.clear();
     one.engine.submit();
     one.engine.begin();
     EXPECT_EQ(one.engine->statistics().lastCompletedFrame.frame, pose);
-    return one.engine->statistics().lastCompletedFrame.seconds;
+    return one.engine.recorder().statistics().gpuSeconds;
   };
   constexpr std::uint64_t late = std::uint64_t{1} << 40;
   slotTicks = {{{late, late + 400}, {late, late + 4'000'000'000}}};
@@ -108,7 +107,7 @@ TEST_F(SystemTimeTest, TheGpusTimeIsTicksTimesTheirPeriod) {
 
 // The real driver's ticks: more than nothing, and less than the wait for the fence.
 TEST_F(SystemTimeTest, TheGpusTimeIsAPartOfTheWait) {
-  SingleInstance one(device(), measured(), plainLayout(), 20000);
+  SingleInstance one(device(), context(), measured(), plainLayout(), 20000);
   one.engine.submit();
   one.engine.begin();
   one.engine.writePose(one.description.pose, systemPose(2));
@@ -117,27 +116,27 @@ TEST_F(SystemTimeTest, TheGpusTimeIsAPartOfTheWait) {
   one.engine.finish();
   const double waited = wait.seconds();
   one.engine.begin();
-  const vulkan::GpuStatistics gpu = one.engine->statistics().lastCompletedFrame;
-  EXPECT_EQ(gpu.frame, 2u);
-  ASSERT_TRUE(gpu.seconds.has_value());
-  EXPECT_GT(*gpu.seconds, 0.0);
-  EXPECT_LE(*gpu.seconds, waited);
+  EXPECT_EQ(one.engine->statistics().lastCompletedFrame.frame, 2u);
+  const std::optional<double> seconds = one.engine.recorder().statistics().gpuSeconds;
+  ASSERT_TRUE(seconds.has_value());
+  EXPECT_GT(*seconds, 0.0);
+  EXPECT_LE(*seconds, waited);
   one.engine.submit();
 }
 
 TEST_F(SystemTimeTest, TimeThatIsNotMeasuredIsNotKnown) {
-  SingleInstance one(device(), description(), plainLayout());
+  SingleInstance one(device(), context(), description(), plainLayout());
   one.engine.submit();
   one.engine.begin();
   EXPECT_EQ(one.engine->statistics().lastCompletedFrame.frame, 1u);
-  EXPECT_FALSE(one.engine->statistics().lastCompletedFrame.seconds.has_value());
+  EXPECT_FALSE(one.engine.recorder().statistics().gpuSeconds.has_value());
   one.engine.submit();
 }
 
 // Planning and recording are what `record` does: both take some time, together no more than the
 // call, and, in a frame in which nobody interrupts it, most of it.
 TEST_F(SystemTimeTest, PlanningAndRecordingAreThePartsOfTheCall) {
-  SingleInstance one(device(), description(), plainLayout(), 8);
+  SingleInstance one(device(), context(), description(), plainLayout(), 8);
   for (int i = 0; i < 3000; ++i) must(one.engine->addInstance(one.description));
   Stopwatch call;
   double called = 0;
@@ -147,7 +146,7 @@ TEST_F(SystemTimeTest, PlanningAndRecordingAreThePartsOfTheCall) {
   for (std::uint32_t frame = 0; frame < 10; ++frame) {
     one.engine.writePose(one.description.pose, systemPose(frame));
     one.engine.submit();
-    const vulkan::FrameStatistics statistics = one.engine.lastFrame();
+    const LastFrame statistics = one.engine.lastFrame();
     EXPECT_GT(statistics.planSeconds, 0.0);
     EXPECT_GT(statistics.recordSeconds, 0.0);
     EXPECT_LE(statistics.planSeconds + statistics.recordSeconds, called);

@@ -16,11 +16,11 @@ inline constexpr std::byte poison{0x5a};
 /// A crowd whose members can be culled on the GPU, and the words by which they are.
 class SystemVisibilityTest : public SystemTest {
  protected:
-  void open(samples::Device& device, vulkan::SkinningSystemDescription system, bool culledOnGpu,
-            const VertexLayout& layout) {
+  void open(samples::Device& device, const vulkan::Context& context,
+            vulkan::SceneRecorderDescription system, bool culledOnGpu, const VertexLayout& layout) {
     // Workgroups are counted: the more instances one skins, the coarser they are.
     system.tuning = Tuning{64, 4};
-    engine_.emplace(device, system);
+    engine_.emplace(device, context, system);
     engine_->begin();
     instance_.mesh = engine_->addMesh(packed_);
     instance_.layout = layout;
@@ -35,7 +35,7 @@ class SystemVisibilityTest : public SystemTest {
     show(0, instanceCount);
   }
   void open(bool culledOnGpu, const VertexLayout& layout) {
-    open(device(), description(), culledOnGpu, layout);
+    open(device(), context(), description(), culledOnGpu, layout);
   }
   void TearDown() override {
     engine_.reset();
@@ -65,10 +65,10 @@ class SystemVisibilityTest : public SystemTest {
     submit();
   }
   /// What the GPU did in the frame that was submitted last.
-  vulkan::GpuStatistics completed() {
+  CullingStatistics completed() {
     const std::uint64_t number = engine_->frame();
     engine_->begin();
-    const vulkan::GpuStatistics statistics = (*engine_)->statistics().lastCompletedFrame;
+    const CullingStatistics statistics = (*engine_)->statistics().lastCompletedFrame;
     EXPECT_EQ(statistics.frame, number);
     return statistics;
   }

@@ -9,13 +9,13 @@ namespace {
 TEST_F(SystemVisibilityTest, OnlyWhatMovesIsDispatched) {
   open(false, plainLayout());
   engine_->submit();
-  const vulkan::FrameStatistics all = engine_->lastFrame();
+  const LastFrame all = engine_->lastFrame();
   EXPECT_EQ(all.skinnedVertices, instanceCount * vertexCount);
   EXPECT_EQ(all.writtenBytes, instanceCount * vertexCount * 24u);
   engine_->begin();
   for (std::uint32_t i = 0; i < 6; ++i) engine_->writePose(palettes_[i * 10], systemPose(i));
   engine_->submit();
-  const vulkan::FrameStatistics few = engine_->lastFrame();
+  const LastFrame few = engine_->lastFrame();
   EXPECT_EQ(few.skinnedInstances, 6u);
   EXPECT_EQ(few.skinnedVertices, 6u * vertexCount);
   EXPECT_EQ(few.writtenBytes, 6u * vertexCount * 24u);
@@ -35,7 +35,7 @@ TEST_F(SystemVisibilityTest, HiddenInstancesAreNotDispatched) {
   for (std::uint32_t i = 0; i < instanceCount; ++i)
     must((*engine_)->change({.instance = instances_[i], .visible = i % 6 == 0}));
   engine_->submit();
-  const vulkan::FrameStatistics few = engine_->lastFrame();
+  const LastFrame few = engine_->lastFrame();
   EXPECT_EQ(few.skinnedInstances, 10u);
   EXPECT_EQ(few.skinnedVertices, 10u * vertexCount);
   EXPECT_LE(few.workgroups * 4, allWorkgroups);
@@ -57,7 +57,7 @@ TEST_F(SystemVisibilityTest, TheEngineMayCullOnTheGpu) {
   EXPECT_EQ(engine_->lastFrame().skinnedInstances, 0u) << "the CPU does not know";
   std::vector<std::byte> bytes = engine_->readOutput();
   for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, 0, 0);
-  vulkan::GpuStatistics gpu = completed();
+  CullingStatistics gpu = completed();
   EXPECT_EQ(gpu.visibleInstances, instanceCount);
   EXPECT_EQ(gpu.skinnedInstances, instanceCount);
   EXPECT_GT(gpu.workgroups, 0u);
@@ -119,7 +119,7 @@ TEST_F(SystemVisibilityTest, WhatRestsInViewOfTheGpuSettlesAndIsNotSkinnedAgain)
   moveAllInFrame(100);
   engine_->begin();
   submit();
-  vulkan::GpuStatistics gpu = completed();
+  CullingStatistics gpu = completed();
   EXPECT_EQ(gpu.skinnedInstances, 0u);
   EXPECT_EQ(gpu.settledInstances, instanceCount);
   std::vector<std::byte> bytes = engine_->readOutput();
@@ -146,7 +146,7 @@ TEST_F(SystemVisibilityTest, WhatTheGpuShowsAgainSettlesOnlyIfItHasTo) {
   show(0, 20);
   engine_->begin();
   submit();  // the first twenty settle, the others are out of view
-  vulkan::GpuStatistics gpu = completed();
+  CullingStatistics gpu = completed();
   EXPECT_EQ(gpu.settledInstances, 20u);
   submit();
   show(0, 0);
@@ -199,7 +199,7 @@ TEST_F(SystemVisibilityTest, UpdateIntervalsHoldForWhatTheGpuSees) {
       }
       ASSERT_TRUE(positions == positionsIn(i + shown[i])) << i << ", frame " << frame;
     }
-    const vulkan::GpuStatistics gpu = completed();
+    const CullingStatistics gpu = completed();
     EXPECT_EQ(gpu.skinnedInstances, skinned);
     EXPECT_LT(skinned, visible / 2) << "they take turns";
   }

@@ -17,7 +17,7 @@
 
 #include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "intercepted_device.h"
 #include "kit/buffer.h"
 #include "random_rig.h"
@@ -329,14 +329,13 @@ TEST_F(ThreadsTest, ManyPrepareTheSameVariants) {
 
 // A system is one thread's, but for `prepare` and the memory of poses.
 TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
-  vulkan::SkinningSystemDescription description;
-  description.context = &context();
-  description.meshCapacity = description.outputCapacity = Capacity::fixed(1 << 20);
-  description.jointCapacity = description.instanceCapacity = description.boundsCapacity =
-      Capacity::fixed(256);
+  vulkan::SceneRecorderDescription description;
+  description.scene.meshCapacity = description.scene.outputCapacity = Capacity::fixed(1 << 20);
+  description.scene.jointCapacity = description.scene.instanceCapacity =
+      description.scene.boundsCapacity = Capacity::fixed(256);
   description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.tuning = Tuning{16, 2};
-  SystemEngine engine(device(), description);
+  SystemEngine engine(device(), context(), description);
   OwnedMesh mesh = randomMesh(1, 500, 10, 4);
   const PackedMesh packed = *pack(mesh.view(), 10);
   InstanceDescription instance;
@@ -352,7 +351,7 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
     InstanceDescription later;
     later.culledOnGpu = true;
     runOnThreads([&](std::size_t) {
-      if (!engine->prepare(pipelineNeeds(later))) ++failures;
+      if (!engine.recorder().prepare(later)) ++failures;
     });
   });
   for (std::uint32_t frame = 0; frame < 10; ++frame) {
@@ -391,7 +390,7 @@ TEST_F(ThreadsTest, ManyRecordSystemsOfOneContext) {
   const PackedMesh packed = *pack(mesh.view(), 10);
   struct Engine {
     samples::MappedBuffer output;
-    std::optional<vulkan::SkinningSystem> system;
+    std::optional<vulkan::SceneRecorder> system;
     std::vector<InstanceHandle> instances;
     ThreadCommands commands;
   };
@@ -408,24 +407,23 @@ TEST_F(ThreadsTest, ManyRecordSystemsOfOneContext) {
   runOnThreads([&](std::size_t thread) {
     Engine& engine = engines[thread];
     engine.commands.begin(device());
-    vulkan::SkinningSystemDescription description;
-    description.context = &context();
-    description.framesInFlight = frames;
-    description.meshCapacity = {16};
-    description.jointCapacity = {1};
+    vulkan::SceneRecorderDescription description;
+    description.scene.framesInFlight = frames;
+    description.scene.meshCapacity = {16};
+    description.scene.jointCapacity = {1};
     description.output = engine.output.range();
-    engine.system.emplace(must(vulkan::SkinningSystem::create(description)));
-    vulkan::SkinningSystem& system = *engine.system;
+    engine.system.emplace(must(vulkan::SceneRecorder::create(context(), description)));
+    vulkan::SceneRecorder& system = *engine.system;
     InstanceDescription instance;
     for (std::uint32_t frame = 1; frame <= frames; ++frame) {
-      must(system.beginFrame(frame, 0));
-      instance.mesh = must(system.addMesh(packed));
-      instance.pose = must(system.addPose(10));
-      must(system.prepare(pipelineNeeds(instance)));
-      engine.instances.push_back(must(system.addInstance(instance)));
+      must(system.scene().beginFrame(frame, 0));
+      instance.mesh = must(system.scene().addMesh(packed));
+      instance.pose = must(system.scene().addPose(10));
+      must(system.prepare(instance));
+      engine.instances.push_back(must(system.scene().addInstance(instance)));
       const std::uint32_t seed = frame + (thread == 0 ? 100 : 0);
       std::ranges::copy(randomPose(seed, 10, Rigidity::rigid),
-                        must(system.writePose(instance.pose)).begin());
+                        must(system.scene().writePose(instance.pose)).begin());
       if (!system.record(engine.commands.buffer)) ++failures;
     }
   });
@@ -438,8 +436,9 @@ TEST_F(ThreadsTest, ManyRecordSystemsOfOneContext) {
     const Engine& engine = engines[thread];
     std::vector<std::byte> bytes;
     for (const InstanceHandle instance : engine.instances) {
-      const std::vector<std::byte> one = readAttribute(
-          engine.output.bytes(), must(engine.system->output(instance)).positions, vertexCount);
+      const std::vector<std::byte> one =
+          readAttribute(engine.output.bytes(),
+                        must(engine.system->scene().output(instance)).positions, vertexCount);
       bytes.insert(bytes.end(), one.begin(), one.end());
     }
     return bytes;

@@ -28,6 +28,7 @@ const std::vector<std::string> neededFunctions{"vkGetDeviceProcAddr",
                                                "vkDestroyPipeline",
                                                "vkCreateDescriptorPool",
                                                "vkDestroyDescriptorPool",
+                                               "vkResetDescriptorPool",
                                                "vkAllocateDescriptorSets",
                                                "vkUpdateDescriptorSets",
                                                "vkCreateBufferView",
@@ -161,14 +162,22 @@ void expectFailureOf(const char* function, const Error& error) {
 TEST(ContextTest, AFailureWhileBindingIsAnErrorAndLeaksNothing) {
   for (const char* function : {"vkCreateDescriptorPool", "vkAllocateDescriptorSets"}) {
     FailingContext failing(function, 0);
+    ASSERT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
     const int before = failing.mock.aliveObjects();
-    const Result<vulkan::Bindings> bindings =
-        failing.context->createBindings(failing.batch.buffers());
-    ASSERT_FALSE(bindings.ok()) << function;
-    expectFailureOf(function, bindings.error());
-    EXPECT_EQ(failing.mock.aliveObjects(), before) << function;
-    failing.mock.failing.clear();
-    EXPECT_TRUE(failing.context->createBindings(failing.batch.buffers()).ok()) << function;
+    {
+      const Result<vulkan::Bindings> bindings =
+          failing.context->createBindings(failing.batch.buffers());
+      ASSERT_TRUE(bindings.ok()) << function;
+      const auto record = [&] {
+        return failing.context->record(commandBuffer, failing.batch.plan, *bindings);
+      };
+      const Result<void> recorded = record();
+      ASSERT_FALSE(recorded.ok()) << function;
+      expectFailureOf(function, recorded.error());
+      EXPECT_TRUE(failing.mock.commands.empty());
+      failing.mock.failing.clear();
+      EXPECT_TRUE(record().ok()) << function;
+    }
     EXPECT_EQ(failing.mock.aliveObjects(), before) << function;
   }
 }

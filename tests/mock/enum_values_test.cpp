@@ -19,8 +19,8 @@
 #include "core_plan_simulation.h"
 #include "dermis/bounds.h"
 #include "dermis/centers_of_rotation.h"
+#include "dermis/cpu/scene_runner.h"
 #include "dermis/cpu/skin.h"
-#include "dermis/cpu/skinning_system.h"
 #include "dermis/gltf.h"
 #include "dermis/shader_compiler.h"
 #include "dermis/validate.h"
@@ -30,6 +30,7 @@
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
 #include "plan/placement.h"
+#include "planned_scene.h"
 #include "scene_meshes.h"
 #include "test_paths.h"
 
@@ -60,16 +61,17 @@ class EnumValuesTest : public MockContextTest {
  protected:
   void SetUp() override {
     create(true);
-    SceneDescription ofScene;
+    SceneCommandsDescription ofScene;
     ofScene.limits = richLimits();
-    scene_.emplace(must(Scene::create(ofScene)));
-    instance_.mesh = must(scene_->addMesh(packed_.info()));
+    planned_.emplace(ofScene);
+    scene_ = &planned_->scene();
+    instance_.mesh = must(planned_->addMesh(packed_.info()));
     instance_.pose = must(scene_->addPose(jointCount));
     instance_.box = box_;
-    system_.emplace(must(cpu::SkinningSystem::create({})));
-    ofSystem_ = instance_;
-    ofSystem_.mesh = must(system_->addMesh(packed_));
-    ofSystem_.pose = must(system_->addPose(jointCount));
+    runner_.emplace(must(cpu::SceneRunner::create()));
+    ofRunner_ = instance_;
+    ofRunner_.mesh = must(runner_->scene().addMesh(packed_));
+    ofRunner_.pose = must(runner_->scene().addPose(jointCount));
   }
 
   InstanceDescription chosen(InstanceDescription instance, const Choice& choice) const {
@@ -127,10 +129,9 @@ class EnumValuesTest : public MockContextTest {
     job.instances = {&instance, 1};
     return cpu::skin(job);
   }
-  template <typename System>
-  static Result<void> add(System& system, const InstanceDescription& instance) {
-    const Result<InstanceHandle> added = system.addInstance(instance);
-    return added ? system.removeInstance(*added) : added.error();
+  static Result<void> add(Scene& scene, const InstanceDescription& instance) {
+    const Result<InstanceHandle> added = scene.addInstance(instance);
+    return added ? scene.removeInstance(*added) : added.error();
   }
   Result<void> change(const Choice& choice) {
     const InstanceHandle handle = must(scene_->addInstance(instance_));
@@ -202,9 +203,9 @@ class EnumValuesTest : public MockContextTest {
         {"Scene::addInstance",
          [this](const Choice& choice) { return add(*scene_, chosen(instance_, choice)); }, all},
         {"Scene::change", [this](const Choice& choice) { return change(choice); }, {"method"}},
-        {"cpu::SkinningSystem::addInstance",
-         [this](const Choice& choice) { return add(*system_, chosen(ofSystem_, choice)); }, all,
-         isForComparison},
+        {"cpu::SceneRunner::addInstance",
+         [this](const Choice& choice) { return add(runner_->scene(), chosen(ofRunner_, choice)); },
+         all, isForComparison},
         {"cpu::skin", [this](const Choice& choice) { return skin(choice); }, attributes,
          isForComparison},
         {"cpu::skinVertices",
@@ -271,9 +272,10 @@ class EnumValuesTest : public MockContextTest {
   Pose pose_ = systemPose(1, jointCount);
   Box box_{{-100, -100, -100}, {100, 100, 100}};
   std::vector<std::byte> output_{4 * 16 * (vertexCount + 3)};
-  std::optional<Scene> scene_;
-  std::optional<cpu::SkinningSystem> system_;
-  InstanceDescription instance_, ofSystem_;
+  std::optional<PlannedScene> planned_;
+  Scene* scene_ = nullptr;
+  std::optional<cpu::SceneRunner> runner_;
+  InstanceDescription instance_, ofRunner_;
 };
 
 TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
@@ -345,25 +347,21 @@ TEST_F(EnumValuesTest, NoVariantPoisonsThePipelinesOfAnother) {
 }
 
 TEST_F(EnumValuesTest, RolesAndWritersAreChecked) {
-  vulkan::SkinningSystemDescription ofSystem;
-  ofSystem.context = &*context;
   Plan plan;
   for (std::uint32_t value = 0; value < 256; ++value) {
     SCOPED_TRACE(value);
     const auto role = number<BufferRole>(value);
     const bool isRole = value < bufferRoleCount;
-    EXPECT_EQ(isInvalid(Scene::buffer(SceneDescription{}, role)), !isRole);
-    EXPECT_EQ(isInvalid(vulkan::SkinningSystem::requirement(ofSystem, role)), !isRole);
+    EXPECT_EQ(isInvalid(vulkan::SceneRecorder::requirement(*context, {}, role)), !isRole);
     if (!isRole) {
-      EXPECT_EQ(scene_->buffer(role).size, 0u);
       EXPECT_EQ(plan.buffer(role).size, 0u);
     }
 
     const PoseOptions options{.writer = number<PoseWriter>(value)};
-    const std::uint32_t buffers = scene_->poseBufferCount();
+    const std::size_t buffers = planned_->buffers.size();
     EXPECT_EQ(isInvalid(scene_->addPose(jointCount, options)), value > 1);
-    EXPECT_EQ(isInvalid(system_->addPose(jointCount, options)), value > 0);
-    EXPECT_TRUE(value < 2 || scene_->poseBufferCount() == buffers);
+    EXPECT_EQ(isInvalid(runner_->scene().addPose(jointCount, options)), value > 0);
+    EXPECT_TRUE(value < 2 || planned_->buffers.size() == buffers);
   }
 }
 

@@ -77,6 +77,9 @@ void VKAPI_CALL destroyPipeline(VkDevice, VkPipeline pipeline,
                                 const VkAllocationCallbacks* allocator) {
   destroy("Pipeline", allocator, pipeline);
 }
+VkResult VKAPI_CALL resetDescriptorPool(VkDevice, VkDescriptorPool, VkDescriptorPoolResetFlags) {
+  return VK_SUCCESS;
+}
 VkResult VKAPI_CALL allocateDescriptorSets(VkDevice, const VkDescriptorSetAllocateInfo* info,
                                            VkDescriptorSet* sets) {
   if (mock->failing == "vkAllocateDescriptorSets") return mock->failure;
@@ -190,6 +193,7 @@ void VKAPI_CALL cmdBindDescriptorSets(VkCommandBuffer, VkPipelineBindPoint, VkPi
                                       std::uint32_t, const std::uint32_t*) {
   mock->next.descriptors = mock->sets.at(*set);
   mock->commands.push_back("bind sets");
+  mock->next.set = *set;
 }
 void VKAPI_CALL cmdPushDescriptorSet(VkCommandBuffer, VkPipelineBindPoint, VkPipelineLayout,
                                      std::uint32_t, std::uint32_t count,
@@ -251,6 +255,7 @@ PFN_vkVoidFunction find(const char* name) {
       MOCK_FUNCTION("vkDestroyPipelineLayout", destroyPipelineLayout),
       MOCK_FUNCTION("vkCreateDescriptorPool", createDescriptorPool),
       MOCK_FUNCTION("vkDestroyDescriptorPool", destroyDescriptorPool),
+      MOCK_FUNCTION("vkResetDescriptorPool", resetDescriptorPool),
       MOCK_FUNCTION("vkCreateComputePipelines", createComputePipelines),
       MOCK_FUNCTION("vkDestroyPipeline", destroyPipeline),
       MOCK_FUNCTION("vkAllocateDescriptorSets", allocateDescriptorSets),

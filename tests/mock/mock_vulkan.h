@@ -30,6 +30,7 @@ using MockDescriptors = std::map<std::uint32_t, MockDescriptor>;  ///< by bindin
 struct MockDispatch {
   const std::uint32_t* code = nullptr;  ///< of the pipeline's module
   MockDescriptors descriptors;
+  VkDescriptorSet set = VK_NULL_HANDLE;  ///< null if descriptors are pushed
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t groupCountX = 0, groupCountY = 0;
 };

@@ -2,7 +2,7 @@
 # compiled.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
-set(core dermis/dermis.h dermis/cpu/skinning_system.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
+set(core dermis/dermis.h dermis/cpu/scene_runner.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
     dermis/shader_compiler.h)
 set(vulkan dermis/vulkan/vulkan.h)
 if(runtimeCompiler)

@@ -20,23 +20,23 @@ std::vector<std::byte> skinOne(const PackedMesh& mesh, Method method, const Vert
   return bytes;
 }
 
-CpuEngine::CpuEngine(const cpu::SkinningSystemDescription& description)
-    : system_(must(cpu::SkinningSystem::create(description))) {}
+CpuEngine::CpuEngine(const SceneDescription& description, std::span<std::byte> output)
+    : runner_(must(cpu::SceneRunner::create(description, output))) {}
 
 MeshHandle CpuEngine::addMesh(const PackedMesh& mesh) {
-  const MeshHandle handle = must(system_.addMesh(mesh));
+  const MeshHandle handle = must(scene().addMesh(mesh));
   vertexCounts_[{handle.index, handle.generation}] = mesh.vertexCount();
   return handle;
 }
 
 void CpuEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matrices) {
-  const std::span<JointMatrix> to = must(system_.writePose(pose));
+  const std::span<JointMatrix> to = must(scene().writePose(pose));
   if (to.size() != matrices.size()) throw std::runtime_error("the pose has another size");
   std::ranges::copy(matrices, to.begin());
 }
 
 void CpuEngine::submit() {
-  const std::span<const cpu::PlannedJob> planned = must(system_.jobs(verticesPerJob));
+  const std::span<const cpu::PlannedJob> planned = must(runner_.jobs(verticesPerJob));
   std::vector<cpu::PlannedJob> jobs(planned.begin(), planned.end());
   std::ranges::shuffle(jobs, random_);
   jobCount_ = jobs.size();
@@ -50,18 +50,18 @@ void CpuEngine::submit() {
 }
 
 void CpuEngine::abandon(const std::function<void()>& meanwhile) {
-  static_cast<void>(must(system_.jobs(verticesPerJob)));
+  static_cast<void>(must(runner_.jobs(verticesPerJob)));
   meanwhile();
-  must(system_.abandonFrame());
+  must(scene().abandonFrame(frame()));
 }
 
 std::vector<std::byte> CpuEngine::readOutput() const {
-  const std::span<const std::byte> bytes = system_.outputBytes();
+  const std::span<const std::byte> bytes = runner_.output();
   return {bytes.begin(), bytes.end()};
 }
 
 Streams CpuEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
-  const InstanceOutput output = must(system_.output(instance));
+  const InstanceOutput output = must(scene().output(instance));
   if (output.size == 0) return {};
   const std::uint32_t vertices = vertexCounts_.at({output.mesh.index, output.mesh.generation});
   return readStreams(bytes, output, vertices);

@@ -1,4 +1,4 @@
-// A small engine around a cpu::SkinningSystem, with the calls of SystemEngine.
+// A small engine around a cpu::SceneRunner, with the calls of SystemEngine.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "dermis/cpu/scene_runner.h"
 #include "dermis/cpu/skin.h"
-#include "dermis/cpu/skinning_system.h"
 #include "scene_meshes.h"
 
 namespace dermis::test {
@@ -22,21 +22,22 @@ class CpuEngine {
  public:
   static constexpr bool hasGpu = false;
 
-  explicit CpuEngine(const cpu::SkinningSystemDescription& description);
+  explicit CpuEngine(const SceneDescription& description, std::span<std::byte> output = {});
 
-  cpu::SkinningSystem& system() { return system_; }
-  cpu::SkinningSystem* operator->() { return &system_; }
+  cpu::SceneRunner& runner() { return runner_; }
+  Scene& scene() const { return runner_.scene(); }
+  Scene* operator->() const { return &scene(); }
 
   MeshHandle addMesh(const PackedMesh& mesh);
   void writePose(PoseHandle pose, std::span<const JointMatrix> matrices);
 
-  void begin() { system_.beginFrame(); }
+  void begin() { must(scene().beginFrame(frame() + 1, frame())); }
   /// Does the jobs of the frame on two threads, in a random order.
   void submit();
   /// Lists the jobs, calls `meanwhile`, and says that none was done.
   void abandon(const std::function<void()>& meanwhile);
-  std::uint64_t frame() const { return system_.frame(); }
-  std::uint64_t completedFrame() const { return system_.frame() - 1; }
+  std::uint64_t frame() const { return scene().frame(); }
+  std::uint64_t completedFrame() const { return scene().frame() - 1; }
   /// The last frame had nothing to do.
   bool isIdle() const { return jobCount_ == 0; }
 
@@ -46,7 +47,7 @@ class CpuEngine {
   std::uint32_t verticesPerJob = 1 << 16;
 
  private:
-  cpu::SkinningSystem system_;
+  cpu::SceneRunner runner_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
   std::size_t jobCount_ = 0;
   std::mt19937 random_{1};

@@ -75,8 +75,8 @@ class ModelSteps {
   virtual void addRefusedCalls(std::vector<RefusedCall>& /*calls*/) {}
   /// The same between the end of a frame and the begin of the next.
   virtual std::vector<RefusedCall> callsBetweenFrames() = 0;
-  /// Counts up when the output grows.
-  virtual std::uint64_t outputGeneration() = 0;
+  /// Differs if the output has become another buffer.
+  virtual std::uint64_t outputNow() = 0;
   /// An instance skinned alone.
   virtual Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                             const InstanceDescription& description,
@@ -92,7 +92,6 @@ class ModelSteps {
       if (number % systemSteps != systemSteps - 1) continue;
       runFrame();
       expectOutputs();
-      growths_ += outputGeneration();
       makeSystem();
     }
     // Or else nothing was tested.
@@ -126,7 +125,7 @@ class ModelSteps {
     narrow_ = must(system().addPose(1));
   }
 
-  auto& system() { return engine_->system(); }
+  Scene& system() { return engine_->scene(); }
   std::uint32_t below(std::size_t count) { return static_cast<std::uint32_t>(random_() % count); }
   bool chance(std::uint32_t percent) { return below(100) < percent; }
   ModelInstance& anyInstance() { return model_->instances[below(model_->instances.size())]; }
@@ -331,6 +330,7 @@ class ModelSteps {
     if (chance(15)) system().compact(below(40'000));
     if (chance(15)) {
       abandon();
+      model_->afterAbandon();
       ++abandonedFrames_;
       if (chance(50)) return beginFrame();
     }
@@ -347,6 +347,8 @@ class ModelSteps {
     }
     ++submittedFrames_;
     model_->afterRecord();
+    const std::uint64_t output = outputNow();
+    growths_ += std::exchange(output_, output) != output;
     movedInstances_ += system().movedInstances().size();
     if (submittedFrames_ % 8 == 0) expectOutputs();
     beginFrame();
@@ -545,7 +547,7 @@ class ModelSteps {
   std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;
   std::set<std::string> messages_;  ///< of all errors
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;
-  std::uint64_t growths_ = 0;
+  std::uint64_t growths_ = 0, output_ = 0;
   std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
 };
 

@@ -15,6 +15,18 @@ struct PlannedDispatch : DispatchCommand {
   abi::PalettePush palettePush() const { return abi::load<abi::PalettePush>(constants, 0); }
   abi::ClearPush clearPush() const { return abi::load<abi::ClearPush>(constants, 0); }
   abi::SkinPush skinPush() const { return abi::load<abi::SkinPush>(constants, 0); }
+  /// What a storage buffer slot is bound to; nothing if the dispatch has no such slot.
+  BufferPart partAt(std::uint32_t slot) const {
+    for (const Binding& binding : bindings) {
+      if (binding.slot == slot) return binding.part;
+    }
+    return {};
+  }
+  /// The part of an output that the skin kernel writes. Devices with few storage buffers have one.
+  BufferPart outputPart(std::size_t stream) const {
+    const BufferPart own = partAt(abi::BINDING_POSITIONS + static_cast<std::uint32_t>(stream));
+    return own.buffer != noBuffer ? own : partAt(abi::BINDING_POSITIONS);
+  }
 };
 
 inline std::vector<PlannedDispatch> dispatchesOf(const Plan& plan) {

@@ -32,7 +32,7 @@ Result<void> withoutValue(const Result<T>& result) {
   return result ? Result<void>() : result.error();
 }
 
-/// Of vulkan::SkinningSystem and cpu::SkinningSystem.
+/// Of vulkan::SceneRecorder and cpu::SceneRunner.
 template <typename System>
 std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& objects) {
   std::vector<RefusedCall> calls;

@@ -10,12 +10,12 @@ namespace dermis::test {
 using vulkan::barrierBetween;
 using vulkan::Use;
 
-SystemEngine::SystemEngine(samples::Device& device,
-                           const vulkan::SkinningSystemDescription& description)
+SystemEngine::SystemEngine(samples::Device& device, const vulkan::Context& context,
+                           const vulkan::SceneRecorderDescription& description)
     : device_(device),
-      outputSize_(description.outputCapacity.initial / 4 * 4),
+      outputSize_(description.scene.outputCapacity.initial / 4 * 4),
       outputGrows_(description.output.buffer == VK_NULL_HANDLE),
-      system_(must(vulkan::SkinningSystem::create(description))) {}
+      recorder_(must(vulkan::SceneRecorder::create(context, description))) {}
 
 SystemEngine::~SystemEngine() {
   device_.functions().DeviceWaitIdle(device_.handle());
@@ -24,46 +24,46 @@ SystemEngine::~SystemEngine() {
 }
 
 MeshHandle SystemEngine::addMesh(const PackedMesh& mesh) {
-  const MeshHandle handle = must(system_.addMesh(mesh));
+  const MeshHandle handle = must(scene().addMesh(mesh));
   vertexCounts_[key(handle)] = mesh.vertexCount();
   return handle;
 }
 
 PoseHandle SystemEngine::addPose(std::span<const JointMatrix> pose, const PoseOptions& options) {
-  const PoseHandle handle = must(system_.addPose(static_cast<std::uint32_t>(pose.size()), options));
+  const PoseHandle handle = must(scene().addPose(static_cast<std::uint32_t>(pose.size()), options));
   writePose(handle, pose);
   return handle;
 }
 
 InstanceHandle SystemEngine::addInstance(const InstanceDescription& description) {
-  must(system_.prepare(description));
-  return must(system_.addInstance(description));
+  must(recorder_.prepare(description));
+  return must(scene().addInstance(description));
 }
 
 void SystemEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matrices) {
-  if (system_.poseRange(pose).ok()) {
+  if (recorder_.poseRange(pose).ok()) {
     std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return write.pose == pose; });
     gpuWrites_.push_back({pose, {matrices.begin(), matrices.end()}});
     return;
   }
-  const std::span<JointMatrix> mapped = must(system_.writePose(pose));
+  const std::span<JointMatrix> mapped = must(scene().writePose(pose));
   if (mapped.size() != matrices.size()) throw std::runtime_error("the pose has another size");
   std::ranges::copy(matrices, mapped.begin());
 }
 
 void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
   std::erase_if(gpuWrites_,
-                [&](const GpuWrite& write) { return !system_.poseRange(write.pose).ok(); });
+                [&](const GpuWrite& write) { return !recorder_.poseRange(write.pose).ok(); });
   if (gpuWrites_.empty()) return;
   if (recordsPoseBarriers)
     recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
   for (const GpuWrite& write : gpuWrites_) {
-    const vulkan::BufferRange range = must(system_.poseRange(write.pose));
+    const vulkan::BufferRange range = must(recorder_.poseRange(write.pose));
     const std::size_t size = write.matrices.size() * sizeof(JointMatrix);
     if (range.size != size) throw std::runtime_error("the pose has another size");
     device_.functions().CmdUpdateBuffer(commandBuffer, range.buffer, range.offset, size,
                                         write.matrices.data());
-    must(system_.markWritten({&write.pose, 1}));
+    must(scene().markWritten({&write.pose, 1}));
   }
   if (recordsPoseBarriers)
     recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::dermis));
@@ -72,7 +72,7 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
 void SystemEngine::begin(std::uint32_t underWay) {
   waitUntilUnderWay(underWay);
   ++frame_;
-  must(system_.beginFrame(frame_, completedFrame_));
+  must(scene().beginFrame(frame_, completedFrame_));
 }
 
 Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
@@ -81,7 +81,7 @@ Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
   writeGpuPoses(commandBuffer);
   if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
   const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
-                                                 : system_.record(commandBuffer, frame);
+                                                 : recorder_.record(commandBuffer, frame);
   if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
   if (afterRecord) afterRecord(commandBuffer);
   return recorded;
@@ -99,7 +99,7 @@ Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   begin.pInheritanceInfo = &inheritance;
   device_.functions().BeginCommandBuffer(secondary, &begin);
-  Result<void> recorded = system_.record(secondary, frame);
+  Result<void> recorded = recorder_.record(secondary, frame);
   device_.functions().EndCommandBuffer(secondary);
   device_.functions().CmdExecuteCommands(primary, 1, &secondary);
   return recorded;
@@ -108,7 +108,7 @@ Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
 Result<void> SystemEngine::trySubmit(const vulkan::FrameDescription& frame) {
   const VkCommandBuffer commandBuffer = beginCommands();
   const Result<void> recorded = recordFrame(commandBuffer, frame);
-  if (recorded && outputGrows_) outputSize_ = system_.statistics().outputs.capacity;
+  if (recorded && outputGrows_) outputSize_ = scene().statistics().outputs.capacity;
   if (recorded) gpuWrites_.clear();
   submitted_.push_back({frame_, submitCommands(commandBuffer), commandBuffer});
   return recorded;
@@ -121,7 +121,7 @@ void SystemEngine::abandon(const vulkan::FrameDescription& frame,
   device_.functions().EndCommandBuffer(commandBuffer);
   device_.freeCommandBuffer(commandBuffer);
   meanwhile();
-  must(system_.abandonFrame(frame_));
+  must(scene().abandonFrame(frame_));
 }
 
 VkCommandBuffer SystemEngine::beginCommands() {
@@ -183,8 +183,8 @@ std::vector<std::byte> SystemEngine::readOutput() {
   submitNow([this](VkCommandBuffer commandBuffer) {
     recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
     const VkBufferCopy all{0, 0, outputSize_};
-    device_.functions().CmdCopyBuffer(commandBuffer, system_.outputBuffer(), readBack_.handle(), 1,
-                                      &all);
+    device_.functions().CmdCopyBuffer(commandBuffer, recorder_.outputBuffer(), readBack_.handle(),
+                                      1, &all);
     recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
   });
   const std::span<const std::byte> bytes = readBack_.bytes().first(outputSize_);
@@ -194,7 +194,7 @@ std::vector<std::byte> SystemEngine::readOutput() {
 void SystemEngine::fillOutput(std::byte value) {
   submitNow([&](VkCommandBuffer commandBuffer) {
     recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
-    device_.functions().CmdFillBuffer(commandBuffer, system_.outputBuffer(), 0, VK_WHOLE_SIZE,
+    device_.functions().CmdFillBuffer(commandBuffer, recorder_.outputBuffer(), 0, VK_WHOLE_SIZE,
                                       std::to_integer<std::uint32_t>(value) * 0x01010101u);
     recordBarrier(commandBuffer,
                   barrierBetween(Use::copyWrite, Use::dermis | Use::copyRead | Use::copyWrite));
@@ -206,7 +206,7 @@ Streams SystemEngine::read(InstanceHandle instance) {
 }
 
 Streams SystemEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
-  const InstanceOutput output = must(system_.output(instance));
+  const InstanceOutput output = must(scene().output(instance));
   return output.size == 0 ? Streams{} : readStreams(bytes, output, vertexCount(output.mesh));
 }
 

@@ -1,4 +1,4 @@
-// A small engine around a SkinningSystem: frames with a fence each, several under way at once, and
+// A small engine around a SceneRecorder: frames with a fence each, several under way at once, and
 // its output read back.
 #pragma once
 
@@ -15,24 +15,29 @@
 
 #include "dermis/scene.h"
 #include "dermis/vulkan/barrier.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
 #include "scene_meshes.h"
 
 namespace dermis::test {
 
+/// What a frame did, and what it took to record it.
+struct LastFrame : FrameStatistics, vulkan::RecorderStatistics {};
+
 class SystemEngine {
  public:
   static constexpr bool hasGpu = true;
 
-  SystemEngine(samples::Device& device, const vulkan::SkinningSystemDescription& description);
+  SystemEngine(samples::Device& device, const vulkan::Context& context,
+               const vulkan::SceneRecorderDescription& description);
   ~SystemEngine();
   SystemEngine(const SystemEngine&) = delete;
   SystemEngine& operator=(const SystemEngine&) = delete;
 
-  vulkan::SkinningSystem& system() { return system_; }
-  vulkan::SkinningSystem* operator->() { return &system_; }
+  vulkan::SceneRecorder& recorder() { return recorder_; }
+  Scene& scene() const { return recorder_.scene(); }
+  Scene* operator->() const { return &scene(); }
 
   // -- What is in it. Vertices are counted, and pipelines prepared: those of an instance with its
   // mesh, pose and method. A test that changes these to others prepares more.
@@ -64,7 +69,7 @@ class SystemEngine {
   /// The last `record` had nothing to do but copies.
   bool isIdle() const { return lastFrame().dispatches == 0 || lastFrame().copies != 0; }
   /// Of the last `record`.
-  vulkan::FrameStatistics lastFrame() const { return system_.statistics().lastFrame; }
+  LastFrame lastFrame() const { return {scene().statistics().lastFrame, recorder_.statistics()}; }
 
   // -- The output.
   /// All bytes, as of the last frame that was submitted.
@@ -107,7 +112,7 @@ class SystemEngine {
   samples::Device& device_;
   std::uint64_t outputSize_;  ///< as of the last `record`
   bool outputGrows_;
-  vulkan::SkinningSystem system_;
+  vulkan::SceneRecorder recorder_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertexCounts_;
   std::deque<SubmittedFrame> submitted_;
   std::vector<VkCommandBuffer> secondaries_;

@@ -1,6 +1,6 @@
-// A SkinningSystem as simple as can be: for each instance what its output must hold, whether a
+// A SceneRecorder as simple as can be: for each instance what its output must hold, whether a
 // frame had to skin it, and which places frames under way may still read. `Engine` is one of
-// SystemEngine (of vulkan::SkinningSystem) and CpuEngine (of cpu::SkinningSystem).
+// SystemEngine (of vulkan::SceneRecorder) and CpuEngine (of cpu::SceneRunner).
 #pragma once
 
 #include <gtest/gtest.h>
@@ -102,6 +102,21 @@ class SystemModel {
     EXPECT_EQ(gpu.skinnedInstances, counted->second.skinned) << "frame " << gpu.frame;
     EXPECT_EQ(gpu.settledInstances, counted->second.settled) << "frame " << gpu.frame;
     gpuCounts_.erase(gpuCounts_.begin(), std::next(counted));
+  }
+  /// After `abandonFrame`: everything is to be skinned again, and what the outputs hold is unknown.
+  void afterAbandon() {
+    for (ModelInstance& instance : instances) {
+      const InstanceOutput output = must(engine_->output(instance.handle));
+      if (instance.hasPlace() && output.offset != instance.output.offset) lock(instance.output);
+      instance.output = output;
+      if (output.size != 0 && output.mesh == instance.description.mesh)
+        instance.changesMesh = false;
+      instance.change();
+      instance.isUrgent = instance.teleports = true;
+      instance.isMoving = instance.isOwed = false;
+      instance.waitedFrames = 0;
+      instance.shown = instance.before = instance.bounded = std::nullopt;
+    }
   }
   /// After `record`: checks what was skinned, settled and moved, and where everything stands.
   void afterRecord() {
@@ -242,7 +257,7 @@ class SystemModel {
     return isSkinned;
   }
   void checkStatistics(const Lists& lists) const {
-    const FrameWorkStatistics frame = engine_->statistics().lastFrame;
+    const FrameStatistics frame = engine_->statistics().lastFrame;
     EXPECT_EQ(frame.frame, engine_.frame());
     EXPECT_EQ(frame.instances, instances.size());
     EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());

@@ -127,11 +127,14 @@ class Simulation {
     ASSERT_LT(groups, std::uint64_t{dispatch.workgroupCount} + dispatch.groupCountY);
     ASSERT_EQ(dispatch.variant.workgroupSize, tuning_.workgroupSize);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      const OutputWindow& window = dispatch.windows[stream];
-      ASSERT_EQ(window.offset, window.index * outputWindowStep(limits_));
-      ASSERT_EQ(window.offset % limits_.minStorageBufferOffsetAlignment, 0u);
-      if (sizes_[stream] <= limits_.maxStorageBufferRange) {
-        ASSERT_EQ(window.index, 0u);
+      if (dispatch.variant.kernel != Kernel::skin) break;
+      const BufferPart part = dispatch.outputPart(stream);
+      ASSERT_EQ(part.offset % outputWindowStep(limits_), 0u);
+      ASSERT_EQ(part.offset % limits_.minStorageBufferOffsetAlignment, 0u);
+      ASSERT_LE(part.size, limits_.maxStorageBufferRange);
+      if (sizes_[stream] <= limits_.maxStorageBufferRange &&
+          writesStream(dispatch.variant, stream)) {
+        ASSERT_EQ(part.offset, 0u);
       }
     }
   }
@@ -329,7 +332,7 @@ class Simulation {
   /// The job whose positions the record points at.
   void findJob(const PlannedDispatch& dispatch, std::uint64_t record, std::uint32_t firstVertex,
                std::uint32_t& index) {
-    const std::uint64_t place = dispatch.windows[0].offset + instanceAt(record).positions;
+    const std::uint64_t place = dispatch.outputPart(0).offset + instanceAt(record).positions;
     const auto behind =
         std::upper_bound(begins_.begin(), begins_.end(), std::pair{place, ~std::uint32_t{0}});
     ASSERT_NE(behind, begins_.begin()) << "a write that no job asked for";
@@ -359,11 +362,6 @@ class Simulation {
       if (variant.wide[stream]) {
         ASSERT_TRUE(variant.texels && isWanted);
         ASSERT_EQ(attributes[stream].offset % formatSize(attributes[stream].format), 0u);
-      }
-      if (!isWanted) {
-        ASSERT_EQ(dispatch.windows[stream].index, 0u);
-      } else if (limits_.maxStorageBuffersPerStage < storageBuffersWanted) {
-        ASSERT_EQ(dispatch.windows[stream].index, dispatch.windows[0].index);
       }
     }
     // It waits for what it reads or adds to; where there are previous positions, the kernel is one
@@ -439,7 +437,7 @@ class Simulation {
     const Job& job = batch_.jobs[index];
     const OutputAttribute attribute = attributesOf(job)[stream];
     if (attribute.format == VertexFormat::none) return;
-    const std::uint64_t window = dispatch.windows[stream].offset;
+    const std::uint64_t window = dispatch.outputPart(stream).offset;
     ASSERT_LE(window, sizes_[stream]);
     const std::uint64_t range = std::min(limits_.maxStorageBufferRange, sizes_[stream] - window);
     const abi::GroupRecord layout = groupAt(group);

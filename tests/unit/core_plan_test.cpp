@@ -368,9 +368,11 @@ bool samePlan(const Plan& a, const Plan& b) {
            x.groupCountY == y.groupCountY &&
            std::memcmp(&x.constants, &y.constants, sizeof(x.constants)) == 0 &&
            x.isAfterBarrier == y.isAfterBarrier &&
-           std::ranges::equal(x.windows, y.windows,
-                              [](const OutputWindow& v, const OutputWindow& w) -> bool {
-                                return v.index == w.index && v.offset == w.offset;
+           std::ranges::equal(x.bindings, y.bindings,
+                              [](const Binding& v, const Binding& w) -> bool {
+                                return v.slot == w.slot && v.texelSize == w.texelSize &&
+                                       v.part.buffer == w.part.buffer &&
+                                       v.part.offset == w.part.offset && v.part.size == w.part.size;
                               });
   };
   return tablesOf(a) == tablesOf(b) &&

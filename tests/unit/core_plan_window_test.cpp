@@ -24,8 +24,9 @@ DeviceLimits limitsOf(std::uint64_t range, std::uint32_t alignment,
 }
 
 bool hasOneWindow(const PlannedDispatch& dispatch) {
-  return std::all_of(dispatch.windows.begin(), dispatch.windows.end(),
-                     [&](const auto& window) { return window.index == dispatch.windows[0].index; });
+  return std::ranges::all_of(std::array{1u, 2u, 3u}, [&](std::size_t stream) {
+    return dispatch.outputPart(stream).offset == dispatch.outputPart(0).offset;
+  });
 }
 
 TEST(Plan, OutputRangesStepByLessThanTheyAreLong) {
@@ -56,11 +57,11 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
     for (const std::uint32_t storageBuffers : {4u, 8u}) {
       const DeviceLimits limits = limitsOf(range, alignment, storageBuffers);
       ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {16, 3}, out));
-      std::set<std::uint32_t> windows;
+      std::set<std::uint64_t> windows;
       for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
-        windows.insert(dispatch.windows[0].index);
+        windows.insert(dispatch.outputPart(0).offset);
         EXPECT_TRUE(dispatch.variant.normals == VertexFormat::none ||
-                    dispatch.windows[1].index == dispatch.windows[0].index)
+                    dispatch.outputPart(1).offset == dispatch.outputPart(0).offset)
             << "attributes that lie near to each other share a window";
       }
       EXPECT_GT(windows.size(), 1u);
@@ -75,13 +76,13 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
 TEST_P(PlanWindows, SoDoesEveryWriteOfEveryFormatAndMotion) {
   const auto [range, alignment] = GetParam();
   for (const bool separate : {false, true}) {
-    std::set<std::uint32_t> windows;
+    std::set<std::uint64_t> windows;
     bool differ = false;
     for (std::uint32_t seed = 1; seed <= 4; ++seed) {
       const OwnedBatch batch = randomRichBatch(seed, 80, separate);
       const Plan out = planned(batch, limitsOf(range, alignment), {32, 2});
       for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
-        windows.insert(dispatch.windows[0].index);
+        windows.insert(dispatch.outputPart(0).offset);
         differ = differ || !hasOneWindow(dispatch);
       }
     }
@@ -131,7 +132,7 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
     const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
     const bool sharesWindows =
         std::all_of(dispatches.begin(), dispatches.end(), [](const PlannedDispatch& dispatch) {
-          return dispatch.windows[0].index == dispatch.windows[1].index;
+          return dispatch.outputPart(0).offset == dispatch.outputPart(1).offset;
         });
     differ += sharesWindows ? 0 : 1;
     const DeviceLimits few = limitsOf(65536, 256, 4);
@@ -188,10 +189,11 @@ TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
   const Plan out = planned(batch, richLimits());
   ASSERT_EQ(dispatchesOf(out).size(), 1u);
   const std::uint64_t step = outputWindowStep(richLimits());
-  EXPECT_EQ(dispatchesOf(out)[0].windows[0].index, 3 * gigabyte / step);
-  EXPECT_EQ(dispatchesOf(out)[0].windows[1].index, gigabyte / step);
-  EXPECT_EQ(dispatchesOf(out)[0].windows[2].index, 0u);
-  EXPECT_GT(dispatchesOf(out)[0].windows[3].index, dispatchesOf(out)[0].windows[0].index);
+  const PlannedDispatch dispatch = dispatchesOf(out)[0];
+  EXPECT_EQ(dispatch.outputPart(0).offset, 3 * gigabyte / step * step);
+  EXPECT_EQ(dispatch.outputPart(1).offset, gigabyte / step * step);
+  EXPECT_EQ(dispatch.outputPart(2).offset, 0u);
+  EXPECT_GT(dispatch.outputPart(3).offset, dispatch.outputPart(0).offset);
 }
 
 TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
@@ -206,13 +208,13 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   batch.separateSizes = {3 * 1000 * 64, 3 * 1000 * 16, 0, 0};
   const DeviceLimits limits = limitsOf(3 * 1000 * 16, 4);
   const Plan out = planned(batch, limits);
-  std::set<std::uint32_t> positions, normals;
+  std::set<std::uint64_t> positions, normals;
   for (const PlannedDispatch& dispatch : dispatchesOf(out)) {
-    positions.insert(dispatch.windows[0].index);
-    normals.insert(dispatch.windows[1].index);
+    positions.insert(dispatch.outputPart(0).offset);
+    normals.insert(dispatch.outputPart(1).offset);
   }
   EXPECT_GT(positions.size(), 2u);
-  EXPECT_EQ(normals, std::set<std::uint32_t>{0});
+  EXPECT_EQ(normals, std::set<std::uint64_t>{0});
 }
 
 // What lies in one range is not cut; what does not is, and only that.

@@ -1,6 +1,6 @@
 // Ranges of a buffer: none overlaps another, none is lost.
 
-#include "system/range_allocator.h"
+#include "scene/range_allocator.h"
 
 #include <gtest/gtest.h>
 

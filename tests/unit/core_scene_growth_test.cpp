@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/scene.h"
-#include "plan_commands.h"
+#include "planned_scene.h"
 
 namespace dermis::test {
 namespace {
@@ -28,34 +27,25 @@ MeshInfo meshInfo() {
   return info;
 }
 
-/// An engine whose memory ends at `most` bytes for each buffer.
-struct Memory {
-  std::uint64_t most = ~std::uint64_t{0};
-  std::vector<BufferGrowth> asked;
-
-  GrowthCallback callback() {
-    return {this, [](void* user, const BufferGrowth& growth) -> Result<void> {
-              auto& memory = *static_cast<Memory*>(user);
-              memory.asked.push_back(growth);
-              if (growth.requirement.size <= memory.most) return {};
-              return Error{ErrorCode::vulkanError, "no memory"};
-            }};
-  }
-};
-
 class SceneGrowthTest : public ::testing::Test {
  protected:
   SceneGrowthTest() {
     description.limits.maxStorageBufferRange = range;
     description.limits.maxStorageBuffersPerStage = storageBuffersWanted;
-    description.meshCapacity = {meshBytes};
-    description.outputCapacity = {range};
-    description.growth = memory.callback();
+    description.scene.meshCapacity = {meshBytes};
+    description.scene.outputCapacity = {range};
   }
 
   void create() {
-    scene.emplace(Scene::create(description).value());
-    instance.mesh = scene->addMesh(meshInfo()).value();
+    owner.emplace();
+    owner->refuses = [this](const SceneBuffer& wanted) -> Result<void> {
+      if (wanted.requirement.size <= most) return {};
+      return Error{ErrorCode::vulkanError, "no memory"};
+    };
+    must(owner->tryToCreate(description));
+    scene = &owner->scene();
+    owner->asked.clear();
+    instance.mesh = owner->addMesh(meshInfo()).value();
     instance.pose = scene->addPose(4).value();
     instance.layout.normals = VertexFormat::float32x3;
   }
@@ -64,10 +54,9 @@ class SceneGrowthTest : public ::testing::Test {
   std::size_t plannedRuns() {
     ++frame;
     EXPECT_TRUE(scene->beginFrame(frame, frame - 1).ok());
-    EXPECT_TRUE(scene->plan(plan).ok());
-    EXPECT_TRUE(scene->commit().ok());
+    owner->record();
     std::size_t runs = 0;
-    for (const PlannedDispatch& dispatch : dispatchesOf(plan)) {
+    for (const PlannedDispatch& dispatch : dispatchesOf(owner->planned)) {
       if (dispatch.variant.kernel == Kernel::skin) runs += dispatch.skinPush().groupCount;
     }
     return runs;
@@ -80,12 +69,12 @@ class SceneGrowthTest : public ::testing::Test {
     EXPECT_NE(result.error().message.find(text), std::string::npos) << result.error().message;
   }
 
-  Memory memory;
-  SceneDescription description;
-  std::optional<Scene> scene;
+  std::uint64_t most = ~std::uint64_t{0};  ///< of one buffer
+  SceneCommandsDescription description;
+  std::optional<PlannedScene> owner;
+  Scene* scene = nullptr;
   InstanceDescription instance;
   std::uint64_t frame = 0;
-  Plan plan;
 };
 
 // It is longer than what always fits into one range, and lies in one.
@@ -113,7 +102,7 @@ TEST_F(SceneGrowthTest, AnInstanceThatIsCulledOnTheGpuChangesAfterTheOutputHasGr
 }
 
 TEST_F(SceneGrowthTest, WhatWouldLieInTwoRangesStaysWhereItIs) {
-  description.outputCapacity = {range * 4};
+  description.scene.outputCapacity = {range * 4};
   create();
   std::vector<InstanceHandle> before;
   for (int i = 0; i < 3; ++i) before.push_back(scene->addInstance(instance).value());
@@ -143,7 +132,7 @@ TEST_F(SceneGrowthTest, WhatWouldLieInTwoRangesStaysWhereItIs) {
 }
 
 TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereTheyAreAdded) {
-  description.outputCapacity = {range * 2};
+  description.scene.outputCapacity = {range * 2};
   for (const bool separate : {true, false}) {
     description.limits.separateRanges = separate;
     create();
@@ -167,37 +156,37 @@ TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereThe
 TEST_F(SceneGrowthTest, TheLeastIsAskedForWhereThereIsNoMemoryForTwice) {
   create();
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(scene->addInstance(instance).ok());
-  memory.most = range + 24'000;
+  most = range + 24'000;
   ASSERT_TRUE(scene->addInstance(instance).ok());
-  ASSERT_EQ(memory.asked.size(), 2u);
-  EXPECT_EQ(memory.asked[0].requirement.size, 2 * range);
-  EXPECT_EQ(memory.asked[1].requirement.size, 3 * 24'000u);
-  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 3 * 24'000u);
+  ASSERT_EQ(owner->asked.size(), 2u);
+  EXPECT_EQ(owner->asked[0].requirement.size, 2 * range);
+  EXPECT_EQ(owner->asked[1].requirement.size, 3 * 24'000u);
+  EXPECT_EQ(owner->sizeOf(BufferRole::positions), 3 * 24'000u);
   expectRefused(scene->addInstance(instance), ErrorCode::vulkanError, "no memory");
-  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 3 * 24'000u);
+  EXPECT_EQ(owner->sizeOf(BufferRole::positions), 3 * 24'000u);
   // Of poses, another buffer.
-  memory.asked.clear();
-  memory.most = 200 * 2 * sizeof(JointMatrix);
+  owner->asked.clear();
+  most = 200 * 2 * sizeof(JointMatrix);
   ASSERT_TRUE(scene->addPose(100).ok());
   ASSERT_TRUE(scene->addPose(200).ok());
-  ASSERT_EQ(memory.asked.size(), 2u);
-  EXPECT_EQ(memory.asked[0].requirement.size, 256 * 2 * sizeof(JointMatrix));
-  EXPECT_EQ(memory.asked[1].requirement.size, 200 * 2 * sizeof(JointMatrix));
+  ASSERT_EQ(owner->asked.size(), 2u);
+  EXPECT_EQ(owner->asked[0].requirement.size, 256 * 2 * sizeof(JointMatrix));
+  EXPECT_EQ(owner->asked[1].requirement.size, 200 * 2 * sizeof(JointMatrix));
   expectRefused(scene->addPose(201), ErrorCode::vulkanError, "no memory");
 }
 
 TEST_F(SceneGrowthTest, MaximaThatAreNoWholeUnitsEndBeforeThem) {
-  description.meshCapacity = {meshBytes, 2 * meshBytes + 9};
-  description.outputCapacity = {24'000, 72'003};
+  description.scene.meshCapacity = {meshBytes, 2 * meshBytes + 9};
+  description.scene.outputCapacity = {24'000, 72'003};
   create();
-  EXPECT_TRUE(scene->addMesh(meshInfo()).ok());
-  expectRefused(scene->addMesh(meshInfo()), ErrorCode::limitExceeded, "of 64192 bytes");
+  EXPECT_TRUE(owner->addMesh(meshInfo()).ok());
+  expectRefused(owner->addMesh(meshInfo()), ErrorCode::limitExceeded, "of 64192 bytes");
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene->addInstance(instance).ok());
   expectRefused(scene->addInstance(instance), ErrorCode::limitExceeded, "of 72000 bytes");
-  EXPECT_EQ(scene->buffer(BufferRole::meshes).size, 2u * meshBytes);
-  EXPECT_EQ(scene->buffer(BufferRole::positions).size, 72'000u);
-  description.outputCapacity = {5, 6};
-  EXPECT_EQ(Scene::buffer(description, BufferRole::positions).value().size, 8u);
+  EXPECT_EQ(owner->sizeOf(BufferRole::meshes), 2u * meshBytes);
+  EXPECT_EQ(owner->sizeOf(BufferRole::positions), 72'000u);
+  description.scene.outputCapacity = {5, 6};
+  EXPECT_EQ(PlannedScene(description).sizeOf(BufferRole::positions), 8u);
 }
 
 // The device's alignment may be larger than a joint matrix.
@@ -206,12 +195,12 @@ TEST_F(SceneGrowthTest, PosesThatTheGpuWritesCanBeBoundAtTheirOffset) {
   create();
   for (const std::uint32_t joints : {5u, 1u, 100u, 7u, 70u}) {
     const PoseHandle pose = scene->addPose(joints, {.writer = PoseWriter::gpu}).value();
-    EXPECT_EQ(scene->posePlace(pose)->offset % 256, 0u) << joints;
+    EXPECT_EQ(owner->books().posePart(pose)->offset % 256, 0u) << joints;
   }
 }
 
 TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
-  description.jointCapacity = {256, 600};
+  description.scene.jointCapacity = {256, 600};
   create();
   ASSERT_TRUE(scene->addPose(250).ok());
   expectRefused(scene->addPose(400), ErrorCode::limitExceeded,
@@ -228,13 +217,13 @@ TEST_F(SceneGrowthTest, MeshesThatAreNotPackedAreRefused) {
   for (const std::uint32_t size : {0u, 8u, meshBytes + 8, meshBytes - 16}) {
     MeshInfo info = meshInfo();
     info.byteSize = size;
-    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument,
+    expectRefused(owner->addMesh(info), ErrorCode::invalidArgument,
                   "no packed mesh has 1000 vertices in " + std::to_string(size) + " bytes");
   }
   for (const std::uint32_t count : {0u, 1001u, 0xffffffffu}) {
     MeshInfo info = meshInfo();
     info.vertexCount = count;
-    expectRefused(scene->addMesh(info), ErrorCode::invalidArgument,
+    expectRefused(owner->addMesh(info), ErrorCode::invalidArgument,
                   "no packed mesh has " + std::to_string(count) + " vertices");
   }
 }

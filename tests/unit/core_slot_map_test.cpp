@@ -1,6 +1,6 @@
 // Handles: each finds its thing, and none a thing that came later.
 
-#include "system/slot_map.h"
+#include "scene/slot_map.h"
 
 #include <gtest/gtest.h>
 

@@ -12,6 +12,7 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
+#include "dermis/scene_commands.h"
 #include "dermis/types.h"
 #include "dermis/validate.h"
 #include "dermis/version.h"

@@ -1,4 +1,4 @@
-// Handles of the objects of a Scene or SkinningSystem.
+// Handles of the objects of a Scene.
 #pragma once
 
 #include <cstdint>

@@ -281,13 +281,18 @@ DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& n
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
+<<<<<<< HEAD
+/// The buffers of a batch or a scene. Poses, tables, palettes and results of a batch are rewritten
+/// in every frame: each frame in flight needs its own.
+=======
 /// The buffers of a batch or a scene. Poses, tables, palettes and results of a batch, and `upload`
 /// and `readBack` of a scene, are rewritten in every frame: each frame in flight needs its own.
+>>>>>>> parent of 89e5af8 (core, vulkan, gltf: Write the value of every public enumerator)
 enum class BufferRole : std::uint8_t {
   meshes,  ///< packed meshes
   poses,   ///< joint matrices; in a scene, those that the CPU writes
   /// What kernels read about poses and instances. In a batch `writeTables` writes it; in a scene
-  /// the plan copies it from `upload`.
+  /// the plan uploads it.
   tables,
   palettes,           ///< what the palette kernel writes: palettes and `PoseStatus`
   results,            ///< `InstanceResult`
@@ -297,13 +302,12 @@ enum class BufferRole : std::uint8_t {
   previousPositions,  ///< positions of the previous frame
   // Only in a scene (scene.h).
   gpuPoses,    ///< joint matrices that a GPU pass of the engine writes
-  upload,      ///< what `writeTables` writes in a scene
-  readBack,    ///< what `Scene::readBack` reads; copied from counters and results
+  readBack,    ///< what the CPU reads of a complete frame; copied from counters and results
   visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
   history,     ///< what the visibility kernel remembers from frame to frame
   counters,    ///< what the visibility kernel counts
 };
-inline constexpr std::size_t bufferRoleCount = 15;  ///< number of values of `BufferRole`
+inline constexpr std::size_t bufferRoleCount = 14;  ///< number of values of `BufferRole`
 
 /// What a buffer of a plan or a scene needs.
 struct BufferRequirement {
@@ -314,12 +318,25 @@ struct BufferRequirement {
   std::uint32_t usage = 0;
 };
 
-/// The part of an output buffer that a dispatch writes: bind min(buffer size - `offset`,
-/// `maxStorageBufferRange`) bytes that begin at `offset`.
-struct OutputWindow {
-  std::uint32_t index = 0;  ///< number of the window in that buffer
-  /// Bytes. 0 unless the buffer is larger than `maxStorageBufferRange`.
-  std::uint64_t offset = 0;
+/// The number of a buffer in commands. In a batch it is its `BufferRole`. In a scene it is the
+/// `SceneBuffer::number`, or `visibilityBuffer`.
+inline constexpr std::uint32_t noBuffer = 0xffffffff;
+/// In a scene: the buffer of visibility words, which the engine has (`Scene::visibilityCount`).
+inline constexpr std::uint32_t visibilityBuffer = 0;
+
+/// A part of a buffer. Bytes.
+struct BufferPart {
+  std::uint32_t buffer = noBuffer;  ///< its number
+  std::uint64_t offset = 0, size = 0;
+};
+
+/// A descriptor of descriptor set 0.
+struct Binding {
+  std::uint32_t slot = 0;
+  /// 0 for a storage buffer. For a uniform texel buffer the bytes of a texel: 16
+  /// (VK_FORMAT_R32G32B32A32_UINT) or 4 (VK_FORMAT_R32_UINT).
+  std::uint32_t texelSize = 0;
+  BufferPart part;  ///< at most a storage buffer range
 };
 
 // -- Commands, in the terms of Vulkan. An engine with its own RHI visits each and calls what
@@ -332,29 +349,31 @@ struct DispatchCommand {
   std::uint32_t groupCountY = 0;  ///< the third count is 1
   /// Workgroups that do work. `groupCountX` × `groupCountY` may be a little larger. 0 if indirect.
   std::uint32_t workgroupCount = 0;
-  /// If indirect: byte offset of the VkDispatchIndirectCommand in the tables buffer.
+  /// If indirect: where the VkDispatchIndirectCommand is; its buffer is that of `bindings[0]`.
   std::optional<std::uint64_t> indirectOffset;
   /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
   /// SkinPush or VisibilityPush of shaders/abi.h.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
-  std::array<OutputWindow, streamCount> windows;  ///< of the skin kernel, by `Stream`
-  /// The buffer that the kernel reads joints from. The palette kernel: `poses` or `gpuPoses`. The
-  /// skin kernel: `palettes`, except with `Method::linear` in a batch, where it is `poses`.
-  BufferRole joints = BufferRole::palettes;
-  std::uint32_t poseBuffer = 0;  ///< palette kernel of a scene: number of the `Scene::poseBuffer`
+  /// Valid as long as the commands. They include what the kernel declares and does not use.
+  std::span<const Binding> bindings;
+};
+
+/// Bytes of the CPU that are written to a buffer: to its mapping, or by way of a staging buffer.
+struct UploadCommand {
+  BufferPart to;
+  std::span<const std::byte> bytes;  ///< as many as the part has; valid as long as the commands
 };
 
 /// vkCmdCopyBuffer. Consecutive copies do not depend on each other.
 struct CopyCommand {
-  BufferRole from, to;
+  std::uint32_t from, to;                                ///< numbers of buffers
   std::uint64_t fromOffset = 0, toOffset = 0, size = 0;  ///< bytes
 };
 
 /// vkCmdFillBuffer with zeros.
 struct ClearCommand {
-  BufferRole buffer;
-  std::uint64_t offset = 0, size = 0;  ///< bytes
+  BufferPart part;
 };
 
 /// Kinds of access to the buffers of a plan. They are combined with `|`.
@@ -382,7 +401,8 @@ struct BarrierCommand {
 };
 
 /// One command of a plan.
-using Command = std::variant<DispatchCommand, CopyCommand, ClearCommand, BarrierCommand>;
+using Command =
+    std::variant<DispatchCommand, UploadCommand, CopyCommand, ClearCommand, BarrierCommand>;
 
 /// What the palette kernel reports about one pose, in the palettes buffer, at `Plan::statusOffset`.
 /// The engine may copy it from there.
@@ -395,8 +415,8 @@ struct PoseStatus {
 
 struct PlanData;
 
-/// The commands of a batch, or of a frame of a scene. Reuse one object to reuse its memory. While
-/// `makePlan` or `Scene::plan` fills it, no other thread may use it. Afterwards it is immutable:
+/// The commands of a batch. Reuse one object to reuse its memory. While
+/// `makePlan` fills it, no other thread may use it. Afterwards it is immutable:
 /// any number of threads may read it. A moved-from plan may only be filled, assigned to or
 /// destroyed.
 class DERMIS_CORE_API Plan {
@@ -406,35 +426,29 @@ class DERMIS_CORE_API Plan {
   Plan(Plan&&) noexcept;
   Plan& operator=(Plan&&) noexcept;
 
-  /// The commands, in the order in which they must be issued. For a batch: the palette and clear
-  /// kernels if there is anything to convert or clear, then the skin kernels, with a barrier before
-  /// the first that needs it. For a scene, in this order: a barrier that waits for earlier accesses
-  /// (compute, copy, indirect); copies and clears; the kernels; copies to `readBack`; a barrier
-  /// before the host reads. In both cases the engine records the barriers between these commands
-  /// and its own use of the output (vulkan/barrier.h).
+  /// The commands, in the order in which they must be issued: the palette and clear kernels if
+  /// there is anything to convert or clear, then the skin kernels, with a barrier before the first
+  /// that needs it. The engine records the barriers between these commands and its own use of the
+  /// output (vulkan/barrier.h).
   std::span<const Command> commands() const;
   /// The variants of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const Variant> variants() const;
-  /// Requirements of a buffer. For a batch: the sizes of meshes, poses and outputs are those of the
-  /// `Batch`, and the sizes of tables, palettes and results are what this plan needs. For a scene:
-  /// as `Scene::buffer`, but tables and upload have the size that this plan needs. Visibility,
-  /// history and counters have size 0 if the plan culls no instance on the GPU.
+  /// Requirements of a buffer. The sizes of meshes, poses and outputs are those of the `Batch`, and
+  /// the sizes of tables, palettes and results are what this plan needs.
   BufferRequirement buffer(BufferRole role) const;
   /// Byte offset of a pose's `PoseStatus` in the palettes buffer. Empty if the pose is not
-  /// converted, and for the plan of a scene.
+  /// converted.
   std::optional<std::uint64_t> statusOffset(std::uint32_t pose) const;
-  /// Byte offset of a job's `InstanceResult` in the results buffer. Empty if the job has none, and
-  /// for the plan of a scene. Results are in the order of their jobs, without gaps.
+  /// Byte offset of a job's `InstanceResult` in the results buffer. Empty if the job has none.
+  /// Results are in the order of their jobs, without gaps.
   std::optional<std::uint64_t> resultOffset(std::uint32_t job) const;
 
   /// The limits that the plan was made for.
   const DeviceLimits& limits() const;
 
   std::uint32_t dispatchCount() const;  ///< number of dispatches, indirect ones included
-  /// Batch: number of jobs. Scene: number of instance records in the tables.
-  std::uint32_t instanceCount() const;
-  /// Batch: vertices of all jobs. Scene: vertices that the frame skins, without instances that are
-  /// culled on the GPU.
+  std::uint32_t instanceCount() const;  ///< number of jobs
+  /// Vertices of all jobs.
   std::uint64_t vertexCount() const;
 
  private:

@@ -83,7 +83,7 @@ class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
   /// calls return an empty `KernelReload`. Fails with `ioError` if a file cannot be read, with
   /// `invalidArgument` if `abi.h` changed, and as `replaceKernels` does.
   ///
-  /// A `SkinningSystem` does not skin again because of a reload: instances at rest keep what the
+  /// A scene does not skin again because of a reload: instances at rest keep what the
   /// old kernels wrote until their pose is written.
   Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
                               std::uint64_t completedFrame);

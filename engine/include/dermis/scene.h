@@ -1,20 +1,20 @@
-// The bookkeeping of a scene, without Vulkan: its meshes, poses and instances, their places in the
-// buffers, and the work of each frame. `plan` makes a list of commands (plan.h).
+// A scene: meshes, poses and instances by handle, which may be added, removed and changed while
+// frames are in flight, and where the skinned vertices are. Who executes its frames owns it:
 //
-// `vulkan::SkinningSystem` contains a Scene, and executes its commands on its own buffers.
-// Functions that both have are documented here. An engine with its own RHI uses Scene directly:
+// - `vulkan::SceneRecorder` (vulkan/scene_recorder.h) records them into a command buffer;
+// - `cpu::SceneRunner` (cpu/scene_runner.h) makes jobs for the engine's threads;
+// - `SceneCommands` (scene_commands.h) lists commands for an engine with its own RHI.
 //
-//     scene.beginFrame(frame, completedFrame);
-//     for each frame f that has become complete: scene.readBack(f, bytes of its read-back buffer);
-//     write joint matrices at scene.writePose(pose)->offset of the poses buffer
+// Code that uses a scene does not depend on its owner:
+//
+//     Scene& scene = recorder.scene();
+//     scene.beginFrame(frame, completedFrame);                     // frame numbers of the engine
+//     std::span<JointMatrix> matrices = *scene.writePose(pose);    // for each pose that changes
 //     ... add, remove, change ...
-//     scene.plan(plan);
-//     writeTables(plan, mapped upload buffer of this frame);
-//     for (const Command& command : plan.commands()) ...
-//     scene.commit();
+//     recorder.record(commandBuffer);          // or runner.jobs(), or commands.plan() and commit()
 //     draw from the output buffer at scene.output(instance)
 //
-// `buffer`, `poseBuffer` and `Plan::buffer` return size and usage of each buffer.
+// Below, to execute a frame means `record`, `jobs`, or `plan` and `commit`.
 #pragma once
 
 #include <cstddef>
@@ -43,34 +43,10 @@ struct Capacity {
   static constexpr Capacity fixed(std::uint64_t count) { return {count, count}; }
 };
 
-/// A request for a larger buffer.
-struct BufferGrowth {
-  /// `meshes`, `palettes`, `results` or `positions` (the output): a larger buffer replaces the old
-  /// one. `poses` or `gpuPoses`: one more buffer, since poses never move.
-  BufferRole role = BufferRole::positions;
-  BufferRequirement requirement;  ///< of the new buffer
-  std::uint32_t poseBuffer = 0;   ///< for `poses` and `gpuPoses`: the number of the new buffer
-};
-
-/// Creates larger buffers, in an engine with its own RHI. `addMesh`, `addPose`, `addPoses`,
-/// `addInstance` and `change` call it. It must not throw, and must not call the Scene.
-///
-/// Before the commands of the next plan, the engine copies the contents of the old buffer to the
-/// new one; palettes need no copy. If that frame is abandoned, the engine copies again in the next
-/// one. It keeps the old buffer until all frames in flight are complete.
-///
-/// The scene first asks for more than it needs now. If that fails, it asks for the minimum. If that
-/// fails, too, the function of the scene fails with the same error and adds nothing.
-struct GrowthCallback {
-  void* user = nullptr;  ///< passed to `grow`
-  /// If null, buffers do not grow: the initial capacities are the maximum.
-  Result<void> (*grow)(void* user, const BufferGrowth& growth) = nullptr;
-};
-
-/// What `Scene::create` needs to know.
+/// How many frames may be in flight, and how much a scene holds.
 struct SceneDescription {
-  /// Maximum number of frames that are recorded but not complete, including the one that is being
-  /// recorded. At least 1.
+  /// Frames whose fence the engine has not yet waited for when it calls `beginFrame`, the new one
+  /// included. At least 1. Ignored by `cpu::SceneRunner`.
   std::uint32_t framesInFlight = 2;
   Capacity meshCapacity{64 << 10};  ///< bytes of packed meshes; at most a storage buffer range
   /// Joints of all poses that the CPU writes. All poses that one call adds are in one buffer, so
@@ -80,18 +56,10 @@ struct SceneDescription {
   /// Bytes of skinned vertices: the sum of `VertexPlaces::size` and of the gaps for alignment. May
   /// be more than a storage buffer range. Initial and maximum are rounded to multiples of 4.
   Capacity outputCapacity{256 << 10};
-  /// Byte offset of the output in its buffer. Offsets in `InstanceOutput` count from the beginning
-  /// of the buffer, offsets in commands from `outputOffset`. Must be a multiple of the alignment
-  /// that `Scene::buffer` returns, which need not be a power of two.
-  std::uint64_t outputOffset = 0;
   Capacity instanceCapacity{256};  ///< live instances
-  Capacity boundsCapacity{64};     ///< live instances with bounds or snorm16 positions
-  /// The limits of the device: `vulkan::Context::limits`, or filled in by the engine. If they have
-  /// fewer storage buffers than `storageBuffersWanted`, as the defaults do, no instance may have
-  /// bounds or snorm16 positions, and `boundsCapacity` is ignored.
-  DeviceLimits limits;
-  Tuning tuning;          ///< `vulkan::Context::tuning`, or the engine's own
-  GrowthCallback growth;  ///< optional
+  /// Live instances with bounds or snorm16 positions. If the device has fewer storage buffers than
+  /// `storageBuffersWanted`, no instance may have these, and this is ignored.
+  Capacity boundsCapacity{64};
 };
 
 /// Who writes the joint matrices of a pose.
@@ -104,12 +72,6 @@ enum class PoseWriter : std::uint8_t {
 struct PoseOptions {
   PoseWriter writer = PoseWriter::cpu;
   bool mayScale = true;  ///< as `PoseDescription::mayScale`
-};
-
-/// One of the buffers that hold poses.
-struct PoseBuffer {
-  PoseWriter writer = PoseWriter::cpu;
-  BufferRequirement requirement;
 };
 
 /// One instance of a scene.
@@ -140,7 +102,7 @@ struct InstanceDescription {
 };
 
 /// What changes about an instance: every member that has a value. If the mesh, pose, method or box
-/// changes, or the instance teleports, the next `plan` skins it whatever its update interval is.
+/// changes, or the instance teleports, the next frame skins it whatever its update interval is.
 struct InstanceChange {
   InstanceHandle instance = {};
   /// An invisible instance is neither skinned nor settled. When it becomes visible, its previous
@@ -170,15 +132,6 @@ struct InstanceVisibility {
   std::uint32_t updateInterval = 1;
 };
 
-/// What `prepare` needs before such an instance is recorded, for any mesh and pose.
-/// `Scene::pipelineNeeds` returns less: the needs of the mesh and pose that it has now.
-inline PipelineNeeds pipelineNeeds(const InstanceDescription& description) {
-  return {.method = description.method,
-          .layout = description.layout,
-          .bounds = description.bounds,
-          .culledOnGpu = description.culledOnGpu};
-}
-
 /// Where the vertices of an instance are in the output buffer.
 struct InstanceOutput {
   /// The mesh that the instance was last skinned with. After a change of mesh it is the old mesh
@@ -202,7 +155,7 @@ struct StoreStatistics {
 
 /// What the frame of the last `commit` does; zeros after `abandonFrame`. Skinned and settled
 /// instances, vertices and bytes written do not include instances culled on the GPU.
-struct FrameWorkStatistics {
+struct FrameStatistics {
   std::uint64_t frame = 0;
   std::uint32_t instances = 0;  ///< in the scene
   std::uint32_t skinnedInstances = 0;
@@ -227,53 +180,22 @@ struct CullingStatistics {
 
 /// What `Scene::statistics` returns.
 struct SceneStatistics {
-  FrameWorkStatistics lastFrame;              ///< the last `commit`
+  FrameStatistics lastFrame;                  ///< the last `commit`
   CullingStatistics lastCompletedFrame;       ///< the last `readBack`
   StoreStatistics meshes, palettes, outputs;  ///< memory now
 };
 
-/// Where the joint matrices of a pose are written.
-struct PosePlace {
-  std::uint32_t poseBuffer = 0;  ///< number of the `Scene::poseBuffer`
-  std::uint64_t offset = 0;      ///< bytes into the pose buffer
-  std::uint32_t jointCount = 0;
-};
-
 class SceneBooks;
 
-/// Meshes, poses and instances, and the commands that skin them frame by frame. Owns CPU memory
-/// only. Not thread-safe: one thread at a time may call a member function.
+/// Meshes, poses and instances, and where their vertices are. Not thread-safe: one thread at a time
+/// may call a member function, or a function of the owner that executes a frame. A scene stays at
+/// one address until its owner is destroyed, even if the owner is moved.
 class DERMIS_CORE_API Scene {
  public:
-  /// Fails with `invalidArgument` if a member of the description is not valid, and with
-  /// `limitExceeded` if an initial capacity needs a buffer larger than a storage buffer range.
-  static Result<Scene> create(const SceneDescription& description);
   ~Scene();
-  Scene(Scene&&) noexcept;
-  Scene& operator=(Scene&&) noexcept;
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
 
-  /// Size and usage that a buffer must have now. For poses see `poseBuffer`.
-  ///
-  /// - `meshes`, `palettes`, `results`, `positions`: `GrowthCallback` reports when they grow.
-  /// - `tables`, `upload`: `Plan::buffer` returns their size, which differs from frame to frame.
-  /// - `readBack`, `history`: `Plan::buffer` returns their size, too. They only grow: keep a buffer
-  /// that
-  ///   is larger than a plan needs (`history` has size 0 if a plan culls nothing). A larger
-  ///   `history` gets the contents of the old one.
-  /// - `upload`, `readBack`: one for each frame in flight.
-  /// - `history`, `counters`, `visibility`: needed only if instances are culled on the GPU.
-  ///
-  /// An engine that replaces a buffer by a larger one keeps the old one until all frames in flight
-  /// are complete.
-  BufferRequirement buffer(BufferRole role) const;
-  /// The same before the scene is created, for the initial capacities. For `poses` and `gpuPoses`:
-  /// the first buffer of that kind. Fails as `create` does.
-  static Result<BufferRequirement> buffer(const SceneDescription& description, BufferRole role);
-  /// Number of buffers for poses. At first there is one for each writer whose initial capacity is
-  /// not 0: first the one of the CPU, then the one of the GPU. More are added when these are full.
-  std::uint32_t poseBufferCount() const;
-  /// `number` is less than `poseBufferCount`; this is not checked.
-  PoseBuffer poseBuffer(std::uint32_t number) const;
   /// The description that the scene was created with. Capacities are rounded, and their maxima are
   /// limited to what the device can hold.
   const SceneDescription& description() const;
@@ -281,65 +203,72 @@ class DERMIS_CORE_API Scene {
   // -- Meshes, poses, instances. They may be added and removed at any time. Memory of removed
   // objects is reused once the frame that was begun last is complete. Functions fail with
   // `invalidArgument` if a handle is null or its object was removed.
+  //
+  // Adding something may make a buffer grow. The larger buffer is created at once, for twice the
+  // size, or for the minimum if there is no memory for that. If there is no memory for the minimum
+  // either, the function fails with the error of whoever creates buffers, and adds nothing. The
+  // next frame copies the contents of the old buffer, which is released once the frames that use it
+  // are complete.
 
-  /// Reserves memory for a packed mesh. The engine copies the bytes to `meshOffset` of the mesh
-  /// buffer before the commands of the next plan, on the same queue. The first barrier of the plan
-  /// covers the copy. Fails with `limitExceeded` if there is no room, with `invalidArgument` if
-  /// no packed mesh has the sizes of `info`, and with the errors of `GrowthCallback::grow`.
-  Result<MeshHandle> addMesh(const MeshInfo& info);
-  Result<std::uint64_t> meshOffset(MeshHandle mesh) const;  ///< bytes into the mesh buffer
+  /// Adds a mesh. The scene keeps the bytes until the GPU has them; on the CPU it keeps the mesh.
+  /// Fails with `limitExceeded` if there is no room.
+  Result<MeshHandle> addMesh(PackedMesh mesh);
   /// Fails with `invalidArgument` if an instance uses the mesh.
   Result<void> removeMesh(MeshHandle mesh);
 
-  /// Reserves memory for a pose. Its contents are undefined: the engine must write identity
-  /// matrices to `posePlace`, or write the pose before the next `plan`. Fails with
-  /// `invalidArgument` if `jointCount` is not from 1 to `maxPoseJoints` or the writer is not valid,
-  /// and as `addMesh` does.
+  /// Adds a pose. All its joint matrices are identities until `writePose`; those of a pose that the
+  /// GPU writes are undefined until a pass of the engine writes them. Fails with `invalidArgument`
+  /// if `jointCount` is not from 1 to `maxPoseJoints`, if the writer is not valid, or if it is the
+  /// GPU for a scene on the CPU, and with `limitExceeded` if there is no room.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
-  /// writes are consecutive: each begins `jointCount` matrices after the one before it. If it
+  /// writes are consecutive in one buffer: each begins `jointCount` matrices after the one before
+  /// it, and the first at a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`. If it
   /// fails, it adds none.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
-  /// Where the current pose is. A pose that the GPU writes never moves. Its offset in its pose
-  /// buffer is a multiple of 16 bytes. The first of the poses that one call of `addPose` or
-  /// `addPoses` adds for the GPU to write is at a multiple of
-  /// `DeviceLimits::minStorageBufferOffsetAlignment`.
-  Result<PosePlace> posePlace(PoseHandle pose) const;
   /// Fails with `invalidArgument` if an instance uses the pose.
   Result<void> removePose(PoseHandle pose);
 
-  /// Adds an instance. The next `plan` skins it. Fails with `invalidArgument` if the description
+  /// Adds an instance. The next frame skins it. Fails with `invalidArgument` if the description
   /// breaks a rule of `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with
-  /// `limitExceeded` if there is no room for it. `compact` may make room in the output.
+  /// `limitExceeded` if there is no room for it. `compact` may make room in the output. On the CPU
+  /// it also fails with `invalidArgument` for an instance that is `culledOnGpu`, and for methods
+  /// that are `isForComparison`.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
-  /// What `prepare` needs for such an instance with this mesh, pose and method. `everyVariant` then
-  /// lists two kernels for most instances, instead of up to nine. Another mesh with the same
-  /// minimum and maximum of influences, or another pose with the same `mayScale`, needs nothing
-  /// more. Fails with `invalidArgument` if the method is not valid, or if the layout breaks a rule
-  /// of `OutputAttribute`, and as `placeVertices` does.
-  Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);
+
+  /// What `vulkan::Context::prepare` needs before such an instance is recorded. If both handles are
+  /// valid, only for instances with the same method whose mesh has the same minimum and maximum of
+  /// influences and whose pose has the same `mayScale`: two kernels for most instances. If a handle
+  /// is null, for any mesh or pose: up to nine. Fails with `invalidArgument` if the method is not
+  /// valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
+  Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
 
   // -- What changes.
 
   /// Begins a frame. `completedFrame` is the newest frame that the GPU has completed, or 0. Frames
-  /// are numbered from 1; numbers may be skipped. Fails with `invalidArgument` if `frame` is not
-  /// larger than the last one, if `completedFrame` is lower than before or not lower than `frame`,
-  /// or if more than `framesInFlight` frames would be in flight.
+  /// are numbered from 1; numbers may be skipped. Reads the results of complete frames, for
+  /// `bounds` and `statistics`. On the CPU, each frame is complete when the next one begins: its
+  /// jobs must be done, and `completedFrame` is only checked. Fails with `invalidArgument` if
+  /// `frame` is not larger than the last one, if `completedFrame` is lower than before or not lower
+  /// than `frame`, or if more than `framesInFlight` frames would be in flight.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
+  /// The number of the frame that was begun last; 0 before the first.
+  std::uint64_t frame() const;
 
-  /// Returns where the engine writes all joint matrices of the pose for this frame. The memory
-  /// holds an older pose that the GPU no longer reads. All instances of the pose are skinned again.
-  /// Fails with `invalidArgument` unless it is called between `beginFrame` and `commit`, and for a
-  /// pose that the GPU writes.
-  Result<PosePlace> writePose(PoseHandle pose);
-  /// States that a GPU pass of the engine writes these poses before the commands of the next
-  /// `plan`. All their instances are skinned again. There is one copy of such a pose: an instance
-  /// that is skinned later uses what the memory holds then. If the frame is abandoned, the engine
-  /// writes and marks the poses again. Fails as `writePose` does, and for a pose that the CPU
-  /// writes; the poses before it in `poses` are then marked.
+  /// Returns memory for the joint matrices of this frame. The engine writes all of it before the
+  /// frame is executed, and never reads it; any thread may write. Frames read it until the next
+  /// `writePose`. All instances of the pose are skinned again. Before the first `beginFrame` it
+  /// returns memory, too: for the first frame. Fails with `invalidArgument` between the execution
+  /// of a frame and the next `beginFrame`, and for a pose that the GPU writes.
+  Result<std::span<JointMatrix>> writePose(PoseHandle pose);
+  /// States that a GPU pass of the engine writes these poses before the commands of this frame. All
+  /// their instances are skinned again. There is one copy of such a pose: an instance that is
+  /// skinned later uses what the memory holds then. If the frame is abandoned, the engine writes
+  /// and marks the poses again. Fails as `writePose` does, and for a pose that the CPU writes; the
+  /// poses before it in `poses` are then marked.
   Result<void> markWritten(std::span<const PoseHandle> poses);
   /// `markWritten` for all poses that the GPU writes.
   Result<void> markAllWritten();
@@ -357,60 +286,36 @@ class DERMIS_CORE_API Scene {
   /// frame. Faster than `change`. Fails as `change` with many changes does.
   Result<void> setVisibility(std::span<const InstanceVisibility> instances);
 
-  /// Whether the next `plan` skins the instance if its pose is written: it is visible, and its
-  /// update interval permits it. An engine need not animate instances that are not due. Returns
-  /// false unless it is called between `beginFrame` and `commit`. An instance that is culled on the
+  /// Whether this frame skins the instance if its pose is written: it is visible, and its update
+  /// interval permits it. An engine need not animate instances that are not due. Returns false
+  /// between the execution of a frame and the next `beginFrame`. An instance that is culled on the
   /// GPU may be due and yet not be skinned.
   Result<bool> isDue(InstanceHandle instance) const;
 
-  /// Moves outputs from the end of the output buffer into free ranges before them. The next `plan`
+  /// Moves outputs from the end of the output buffer into free ranges before them. The next frame
   /// copies them. Moves at most `maxBytes` bytes and returns how many. The old output is kept until
   /// all frames in flight are complete.
   std::uint64_t compact(std::uint64_t maxBytes);
 
-  // -- Frames.
-
-  /// Lists the commands for everything that changed since the last `commit`. If nothing changed,
-  /// there are none; but if instances are culled on the GPU, there are commands in every frame. May
-  /// be called any number of times between `beginFrame` and `commit`. Fails with `invalidArgument`
-  /// if `beginFrame` was not called, and with `limitExceeded` if the tables are larger than a
-  /// storage buffer range.
-  Result<void> plan(Plan& out);
-  /// States that the commands of the last `plan` have been recorded, and will be executed in the
-  /// order of frames. Without it, the next `plan` lists the same work again. Fails with
-  /// `invalidArgument` if there is no plan, or if the scene was changed after it.
-  Result<void> commit();
-
-  /// States that the commands of the last `commit` will never be executed, because the engine did
-  /// not submit the frame. Undoes what `commit` did: `output`, previous positions and update
-  /// intervals are as before it, and the next `plan` lists its work again. Everything that was
-  /// added, removed, changed or written remains, whether before the `commit` or after it.
+  /// States that the last frame that was executed will never reach the GPU, because the engine did
+  /// not submit it, or that none of its jobs was or will be run. Call it before the next
+  /// `beginFrame`; otherwise the frame counts as executed once a later one is complete. The
+  /// command buffer may be reset or freed at once.
+  ///
   /// Afterwards the scene is in the same frame, as after `beginFrame`: the engine may change more,
-  /// write poses, and plan the frame again, or begin another frame.
+  /// write poses, and execute the frame again, or begin another one. All instances are skinned
+  /// again, their motion restarts, and bounds are empty until then, so one frame has no motion
+  /// vectors. What was uploaded is uploaded again, except that the engine writes and marks again
+  /// the poses that its GPU passes wrote. Everything that was added, removed or changed remains.
   ///
-  /// The engine repeats what it recorded in the frame: copies of packed meshes, copies from smaller
-  /// buffers to larger ones (`history` included), and its passes that write poses, with
-  /// `markWritten`.
-  ///
-  /// O(instances). Fails with `invalidArgument` if `frame` is not the one that was committed last,
-  /// or if `beginFrame` was called since: older frames cannot be abandoned.
+  /// O(instances). Fails with `invalidArgument` if `frame` is not the one that was executed last,
+  /// or if `beginFrame` was called since.
   Result<void> abandonFrame(std::uint64_t frame);
 
-  /// Reads the read-back buffer of a complete frame. Call it after `beginFrame`, for each complete
-  /// frame in ascending order, before the buffer is used again. Boxes of a frame that is left out
-  /// are missing until the instance is skinned again. Fails with `invalidArgument` if the frame is
-  /// not complete, not newer than the last one that was read back, or not one of the last
-  /// `framesInFlight` that were committed, and if `bytes` is smaller than what the frame copied
-  /// there; `Plan::buffer(BufferRole::readBack)` returned that size. For frames that copied
-  /// nothing, `bytes` may be empty.
-  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
+  // -- Results, as of the last frame that was executed. Spans are valid until the next one, or
+  // `abandonFrame`. After `abandonFrame` all three lists are empty.
 
-  // -- Results, as of the last `commit`. `vulkan::SkinningSystem::record` commits. Spans are valid
-  // until the next `commit` or `abandonFrame`. After `abandonFrame` all three lists are empty.
-
-  /// Where the skinned vertices of an instance are. Before the first `commit` that skins it, the
-  /// size is 0. An instance that is culled on the GPU has an output from its first `commit` on,
-  /// even if the GPU has not skinned it.
+  /// Where the skinned vertices of an instance are.
   Result<InstanceOutput> output(InstanceHandle instance) const;
   /// Instances that were skinned, in no particular order, without those culled on the GPU.
   std::span<const InstanceHandle> skinnedInstances() const;
@@ -420,24 +325,24 @@ class DERMIS_CORE_API Scene {
   /// Instances whose output has another offset than before.
   std::span<const InstanceHandle> movedInstances() const;
 
-  /// The exact box of the positions, from the newest frame that skinned the instance and was read
-  /// back. Empty if there is no such frame, if `InstanceDescription::bounds` is false, or if
+  /// The exact box of the positions, from the newest complete frame that skinned the instance.
+  /// Empty if there is no such frame, if `InstanceDescription::bounds` is false, or if
   /// `InstanceResult::box` is empty.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
 
-  /// The index of the instance's word in the visibility buffer.
+  /// The index of the instance's word in the visibility buffer (`culledOnGpu`).
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
   /// Number of words in the visibility buffer: larger than every `visibilityIndex`. Grows when
   /// instances are added.
   std::uint32_t visibilityCount() const;
 
-  /// Counts of the last frame, of the newest frame that was read back, and of memory.
+  /// Counts of the last frame, of the newest complete frame that was read back, and of memory.
   SceneStatistics statistics() const;
 
  private:
-  explicit Scene(const SceneDescription& description);
-  friend struct SceneAccess;  // for executors
-  SceneBooks& change();
+  friend struct SceneAccess;  // of the owners
+  explicit Scene(std::unique_ptr<SceneBooks> books);
+  SceneBooks& changed();
   std::unique_ptr<SceneBooks> books_;
 };
 

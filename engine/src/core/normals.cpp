@@ -8,9 +8,9 @@
 
 #include "attribute.h"
 #include "check_mesh.h"
-#include "dermis/text.h"
 #include "linear_algebra.h"
 #include "strict_floating_point.h"
+#include "text.h"
 
 namespace dermis {
 namespace {

@@ -43,206 +43,150 @@ bool isSame(const BufferRange& a, const BufferRange& b) {
   return a.buffer == b.buffer && a.offset == b.offset && a.size == b.size;
 }
 
-VkDescriptorBufferInfo infoOf(const BufferRange& range) {
-  return {range.buffer, range.offset, range.size};
-}
-
 }  // namespace
 
-BindingsState::~BindingsState() {
-  if (context == nullptr) return;
-  for (const VkBufferView view : {tableTexels, meshTexels, meshWords, matrixTexels, paletteTexels})
-    context->table.destroyBufferView(context->device, view, context->allocator);
-  context->table.destroyDescriptorPool(context->device, pool, context->allocator);
-}
+// -- Views.
 
-const BufferRange& BindingsState::output(std::size_t stream) const {
-  const OutputBuffers& outputs = buffers.outputs;
-  switch (static_cast<Stream>(stream)) {
-    case Stream::normals:
-      return outputs.normals;
-    case Stream::tangents:
-      return outputs.tangents;
-    case Stream::previousPositions:
-      return outputs.previousPositions;
-    default:
-      return outputs.positions;
-  }
-}
-
-BoundBuffers BindingsState::paletteKernel(std::uint32_t poseBuffer) const {
-  const auto orElse = [](const BufferRange& range, const BufferRange& other) {
-    return infoOf(range.buffer != VK_NULL_HANDLE ? range : other);
-  };
-  BoundBuffers bound;
-  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound.buffers[abi::BINDING_MESHES] = orElse(poseBuffers[poseBuffer], buffers.tables);
-  bound.buffers[abi::BINDING_PALETTES] = orElse(buffers.palettes, buffers.results);
-  if (context->bindingCount() == abi::BINDING_COUNT)
-    bound.buffers[abi::BINDING_RESULTS] = orElse(buffers.results, buffers.palettes);
-  return bound;
-}
-
-BoundBuffers BindingsState::skinKernel(BufferRole joints, const Windows& windows) const {
-  BoundBuffers bound;
-  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound.buffers[abi::BINDING_MESHES] = infoOf(buffers.meshes);
-  bound.buffers[abi::BINDING_PALETTES] =
-      infoOf(joints == BufferRole::poses ? buffers.poses : buffers.palettes);
-  const bool oneOutput = context->bindingCount() != abi::BINDING_COUNT;
-  for (std::size_t stream = 0; stream < (oneOutput ? 1 : streamCount); ++stream) {
-    const BufferRange& range = output(stream);
-    VkDescriptorBufferInfo& info = bound.buffers[abi::BINDING_POSITIONS + stream];
-    info = infoOf(range);
-    if (range.buffer == VK_NULL_HANDLE) {
-      if (stream != 0) info = bound.buffers[abi::BINDING_POSITIONS];
-      continue;
-    }
-    const std::uint64_t begin = std::min(windows[stream], windowCount(stream) - 1) * windowStep;
-    info.offset += begin;
-    info.range = std::min(range.size - begin, context->limits.maxStorageBufferRange);
-  }
-  bound.texels[abi::BINDING_TABLE_TEXELS - abi::BINDING_COUNT] = tableTexels;
-  bound.texels[abi::BINDING_MESH_TEXELS - abi::BINDING_COUNT] = meshTexels;
-  bound.texels[abi::BINDING_MESH_WORDS - abi::BINDING_COUNT] = meshWords;
-  bound.texels[abi::BINDING_PALETTE_TEXELS - abi::BINDING_COUNT] =
-      joints == BufferRole::poses ? matrixTexels : paletteTexels;
-  // Not an output: the validation layer would report results that are read there and that another
-  // dispatch wrote.
-  if (!oneOutput) {
-    bound.buffers[abi::BINDING_RESULTS] =
-        infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : buffers.tables);
-  }
-  return bound;
-}
-
-BoundBuffers BindingsState::visibilityKernel(const FrameBuffers& frame) const {
-  BoundBuffers bound;
-  bound.buffers[abi::BINDING_TABLES] = infoOf(buffers.tables);
-  bound.buffers[abi::BINDING_VISIBILITY] = infoOf(frame.visibility);
-  bound.buffers[abi::BINDING_HISTORY] = infoOf(frame.history);
-  bound.buffers[abi::BINDING_COUNTERS] = infoOf(frame.counters);
-  if (context->bindingCount() == abi::BINDING_COUNT) {
-    // Without bounds there is no results buffer, and no record refers to one.
-    bound.buffers[abi::BINDING_RESULTS] =
-        infoOf(buffers.results.buffer != VK_NULL_HANDLE ? buffers.results : frame.counters);
-  }
-  return bound;
-}
-
-Result<void> BindingsState::createTexelViews() {
-  if (context->texelBindingCount() == 0) return {};
-  const auto create = [this](const BufferRange& range, VkFormat format, std::uint32_t texelSize,
-                             VkBufferView& view) -> Result<void> {
-    const std::uint64_t texels = range.size / texelSize;
-    if (range.buffer == VK_NULL_HANDLE || texels == 0) return {};
+Result<void> createTexelViews(const ContextState& context, BufferRole role, bool isScene,
+                              BoundBuffer& buffer) {
+  const bool isRead = role == BufferRole::tables || role == BufferRole::meshes ||
+                      role == BufferRole::palettes || (role == BufferRole::poses && !isScene);
+  if (context.texelBindingCount() == 0 || !isRead) return {};
+  const auto create = [&](VkFormat format, std::uint32_t texelSize,
+                          VkBufferView& view) -> Result<void> {
+    const std::uint64_t texels = buffer.range.size / texelSize;
+    if (buffer.range.buffer == VK_NULL_HANDLE || texels == 0) return {};
     VkBufferViewCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
-    info.buffer = range.buffer;
+    info.buffer = buffer.range.buffer;
     info.format = format;
-    info.offset = range.offset;
+    info.offset = buffer.range.offset;
     info.range = texels * texelSize;
     if (const VkResult result =
-            context->table.createBufferView(context->device, &info, context->allocator, &view);
+            context.table.createBufferView(context.device, &info, context.allocator, &view);
         result != VK_SUCCESS) {
       view = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
+      destroyTexelViews(context, buffer);
       return vulkanError("vkCreateBufferView", result);
     }
     return {};
   };
   // Unsigned integers, so that no NaN is changed. Every device supports both formats for uniform
   // texel buffers.
-  constexpr VkFormat unit = VK_FORMAT_R32G32B32A32_UINT;
-  if (Result<void> good = create(buffers.tables, unit, 16, tableTexels); !good) return good;
-  if (Result<void> good = create(buffers.meshes, unit, 16, meshTexels); !good) return good;
-  if (Result<void> good = create(buffers.meshes, VK_FORMAT_R32_UINT, 4, meshWords); !good)
-    return good;
-  if (Result<void> good = create(buffers.poses, unit, 16, matrixTexels); !good) return good;
-  return create(buffers.palettes, unit, 16, paletteTexels);
+  Result<void> made = create(VK_FORMAT_R32G32B32A32_UINT, 16, buffer.units);
+  if (made && role == BufferRole::meshes) made = create(VK_FORMAT_R32_UINT, 4, buffer.words);
+  return made;
 }
 
-std::uint32_t BindingsState::windowCount(std::size_t stream) const {
-  const std::uint64_t size = output(stream).size;
-  if (size <= context->limits.maxStorageBufferRange) return 1;
-  return static_cast<std::uint32_t>((size + windowStep - 1) / windowStep);
-}
-
-std::uint32_t BindingsState::mostWindows() const {
-  std::uint32_t most = 1;
-  for (std::size_t stream = 0; stream < streamCount; ++stream)
-    most = std::max(most, windowCount(stream));
-  return most;
-}
-
-bool writesStream(const Variant& variant, std::size_t stream) {
-  if (variant.kernel != Kernel::skin) return false;
-  switch (static_cast<Stream>(stream)) {
-    case Stream::normals:
-      return variant.normals != VertexFormat::none;
-    case Stream::tangents:
-      return variant.tangents != VertexFormat::none;
-    case Stream::previousPositions:
-      return variant.motion != Motion::none;
-    default:
-      return true;
+void destroyTexelViews(const ContextState& context, BoundBuffer& buffer) {
+  for (VkBufferView* view : {&buffer.units, &buffer.words}) {
+    context.table.destroyBufferView(context.device, *view, context.allocator);
+    *view = VK_NULL_HANDLE;
   }
 }
 
-std::uint32_t BindingsState::commonWindow(const DispatchCommand& dispatch) {
-  std::uint32_t common = 0;
-  for (const OutputWindow& window : dispatch.windows) common = std::max(common, window.index);
-  return common;
+// -- Descriptors.
+
+Descriptors::Descriptors(const ContextState& context, const DispatchCommand& dispatch,
+                         const BoundBuffers& bound) {
+  for (const Binding& binding : dispatch.bindings) {
+    const BoundBuffer& buffer = bound[binding.part.buffer];
+    if (binding.texelSize != 0) {
+      texels[binding.slot - abi::BINDING_COUNT] =
+          binding.texelSize == 16 ? buffer.units : buffer.words;
+      continue;
+    }
+    const std::uint64_t size = buffer.range.size - binding.part.offset;
+    buffers[binding.slot] = {buffer.range.buffer, buffer.range.offset + binding.part.offset,
+                             std::min(size, context.limits.maxStorageBufferRange)};
+  }
 }
 
-Result<void> ContextState::allocateSets(std::uint32_t count, VkDescriptorPool& pool,
-                                        std::vector<VkDescriptorSet>& sets) const {
+DescriptorSets::~DescriptorSets() {
+  for (const Pool& pool : pools_)
+    context->table.destroyDescriptorPool(context->device, pool.pool, context->allocator);
+}
+
+DescriptorSets::DescriptorSets(DescriptorSets&& other) noexcept
+    : context(other.context), pools_(std::move(other.pools_)), made_(std::move(other.made_)) {}
+
+Result<void> DescriptorSets::addPool(std::uint32_t count) {
   const std::array<VkDescriptorPoolSize, 2> sizes{
-      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, count * bindingCount()},
-       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, count * texelBindingCount()}}};
+      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, count * context->bindingCount()},
+       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, count * context->texelBindingCount()}}};
   VkDescriptorPoolCreateInfo poolInfo{};
   poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
   poolInfo.maxSets = count;
-  poolInfo.poolSizeCount = texelBindingCount() != 0 ? 2 : 1;
+  poolInfo.poolSizeCount = context->texelBindingCount() != 0 ? 2 : 1;
   poolInfo.pPoolSizes = sizes.data();
-  if (const VkResult result = table.createDescriptorPool(device, &poolInfo, allocator, &pool);
-      result != VK_SUCCESS) {
-    pool = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
-    return vulkanError("vkCreateDescriptorPool", result);
-  }
-  nameObject(table, device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
-  const std::vector<VkDescriptorSetLayout> layouts(count, setLayout);
-  sets.resize(count);
-  VkDescriptorSetAllocateInfo allocateInfo{};
-  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  allocateInfo.descriptorPool = pool;
-  allocateInfo.descriptorSetCount = count;
-  allocateInfo.pSetLayouts = layouts.data();
-  if (const VkResult result = table.allocateDescriptorSets(device, &allocateInfo, sets.data());
+  VkDescriptorPool pool = VK_NULL_HANDLE;
+  if (const VkResult result = context->table.createDescriptorPool(context->device, &poolInfo,
+                                                                  context->allocator, &pool);
       result != VK_SUCCESS)
-    return vulkanError("vkAllocateDescriptorSets", result);
+    return vulkanError("vkCreateDescriptorPool", result);
+  nameObject(context->table, context->device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
+  pools_.push_back({pool, count, count});
   return {};
 }
 
-/// Descriptor sets for every kernel and window.
-Result<void> BindingsState::createSets() {
-  const std::uint32_t windows = mostWindows();
-  const auto poses = static_cast<std::uint32_t>(poseBuffers.size());
-  if (Result<void> made = context->allocateSets(poses + windows * 2, pool, sets); !made)
-    return made;
-  const auto update = [&](const BoundBuffers& bound, VkDescriptorSet set) {
-    const DescriptorWrites writes(bound, set);
-    if (writes.count() != 0) {
-      context->table.updateDescriptorSets(context->device, writes.count(), writes.data(), 0,
-                                          nullptr);
-    }
+VkDescriptorSet DescriptorSets::findMade(const Descriptors& descriptors) const {
+  const auto isSame = [&](const Made& made) {
+    const auto areEqual = [](const VkDescriptorBufferInfo& a, const VkDescriptorBufferInfo& b) {
+      return a.buffer == b.buffer && a.offset == b.offset && a.range == b.range;
+    };
+    return made.descriptors.texels == descriptors.texels &&
+           std::ranges::equal(made.descriptors.buffers, descriptors.buffers, areEqual);
   };
-  for (std::uint32_t number = 0; number < poses; ++number)
-    update(paletteKernel(number), sets[number]);
-  for (std::uint32_t window = 0; window < windows; ++window) {
-    for (const BufferRole joints : {BufferRole::poses, BufferRole::palettes})
-      update(skinKernel(joints, {window, window, window, window}), sets[skinSet(joints, window)]);
+  const auto found = std::ranges::find_if(made_, isSame);
+  return found == made_.end() ? VK_NULL_HANDLE : found->set;
+}
+
+VkDescriptorSet DescriptorSets::find(const Descriptors& descriptors) const {
+  const std::scoped_lock lock(mutex_);
+  return findMade(descriptors);
+}
+
+Result<void> DescriptorSets::make(const Descriptors& descriptors) {
+  const std::scoped_lock lock(mutex_);
+  if (findMade(descriptors) != VK_NULL_HANDLE) return {};
+  auto pool = std::ranges::find_if(pools_, [](const Pool& one) { return one.left != 0; });
+  if (pool == pools_.end()) {
+    const auto count = static_cast<std::uint32_t>(std::max<std::size_t>(made_.size(), 4));
+    if (Result<void> added = addPool(count); !added) return added;
+    pool = pools_.end() - 1;
   }
+  VkDescriptorSetAllocateInfo allocateInfo{};
+  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  allocateInfo.descriptorPool = pool->pool;
+  allocateInfo.descriptorSetCount = 1;
+  allocateInfo.pSetLayouts = &context->setLayout;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  if (const VkResult result =
+          context->table.allocateDescriptorSets(context->device, &allocateInfo, &set);
+      result != VK_SUCCESS)
+    return vulkanError("vkAllocateDescriptorSets", result);
+  --pool->left;
+  const DescriptorWrites writes(descriptors, set);
+  if (writes.count() != 0) {
+    context->table.updateDescriptorSets(context->device, writes.count(), writes.data(), 0, nullptr);
+  }
+  made_.push_back({descriptors, set});
   return {};
+}
+
+void DescriptorSets::reset() {
+  for (Pool& pool : pools_) {
+    context->table.resetDescriptorPool(context->device, pool.pool, 0);
+    pool.left = pool.count;
+  }
+  made_.clear();
+}
+
+// -- Bindings of batches.
+
+BindingsState::~BindingsState() {
+  if (context == nullptr) return;
+  for (BoundBuffer& buffer : bound) destroyTexelViews(*context, buffer);
 }
 
 Bindings::Bindings() = default;
@@ -251,11 +195,7 @@ Bindings::Bindings(Bindings&&) noexcept = default;
 Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
 Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
-  return state_->createBindings(buffers);
-}
-
-Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers,
-                                              std::vector<BufferRange> poseBuffers) const {
+  const DeviceLimits& limits = state_->limits;
   const OutputBuffers& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
@@ -270,7 +210,7 @@ Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers,
     if (Result<void> good = checkRange(*range, name, limits, mayBeLarger); !good)
       return good.error();
   }
-  if (bindingCount() != abi::BINDING_COUNT) {
+  if (state_->bindingCount() != abi::BINDING_COUNT) {
     for (const BufferRange* range :
          {&outputs.normals, &outputs.tangents, &outputs.previousPositions}) {
       if (range->buffer != VK_NULL_HANDLE && !isSame(*range, outputs.positions)) {
@@ -285,14 +225,23 @@ Result<Bindings> ContextState::createBindings(const BatchBuffers& buffers,
   Bindings bindings;
   bindings.state_ = std::make_unique<BindingsState>();
   BindingsState& state = *bindings.state_;
-  state.context = this;
+  state.context = state.sets.context = state_.get();
   state.buffers = buffers;
-  state.poseBuffers = std::move(poseBuffers);
-  if (state.poseBuffers.empty()) state.poseBuffers.push_back(buffers.poses);
-  state.windowStep = outputWindowStep(limits);
-  if (Result<void> good = state.createTexelViews(); !good) return good.error();
-  if (pushesDescriptors()) return bindings;
-  if (Result<void> good = state.createSets(); !good) return good.error();
+  state.bound.resize(bufferRoleCount);
+  for (const auto& [role, range] : {std::pair{BufferRole::meshes, &buffers.meshes},
+                                    {BufferRole::poses, &buffers.poses},
+                                    {BufferRole::tables, &buffers.tables},
+                                    {BufferRole::palettes, &buffers.palettes},
+                                    {BufferRole::results, &buffers.results},
+                                    {BufferRole::positions, &outputs.positions},
+                                    {BufferRole::normals, &outputs.normals},
+                                    {BufferRole::tangents, &outputs.tangents},
+                                    {BufferRole::previousPositions, &outputs.previousPositions}}) {
+    BoundBuffer& bound = state.bound[static_cast<std::size_t>(role)];
+    bound.range = *range;
+    if (Result<void> made = createTexelViews(*state.context, role, false, bound); !made)
+      return made.error();
+  }
   return bindings;
 }
 

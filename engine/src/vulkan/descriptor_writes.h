@@ -15,7 +15,7 @@ class DescriptorWrites {
  public:
   /// Bindings without a buffer are left out: the kernel's module does not declare them, or the
   /// kernel is not recorded. `bound` must outlive this object.
-  explicit DescriptorWrites(const BoundBuffers& bound, VkDescriptorSet set = VK_NULL_HANDLE) {
+  explicit DescriptorWrites(const Descriptors& bound, VkDescriptorSet set = VK_NULL_HANDLE) {
     for (std::uint32_t binding = 0; binding < bound.buffers.size(); ++binding) {
       if (bound.buffers[binding].buffer == VK_NULL_HANDLE) continue;
       add(set, binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER).pBufferInfo = &bound.buffers[binding];

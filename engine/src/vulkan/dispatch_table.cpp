@@ -64,6 +64,7 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
   loader.deviceFunction("vkDestroyPipeline", table.destroyPipeline);
   loader.deviceFunction("vkCreateDescriptorPool", table.createDescriptorPool);
   loader.deviceFunction("vkDestroyDescriptorPool", table.destroyDescriptorPool);
+  loader.deviceFunction("vkResetDescriptorPool", table.resetDescriptorPool);
   loader.deviceFunction("vkAllocateDescriptorSets", table.allocateDescriptorSets);
   loader.deviceFunction("vkUpdateDescriptorSets", table.updateDescriptorSets);
   loader.deviceFunction("vkCreateBufferView", table.createBufferView);

@@ -26,6 +26,7 @@ struct DispatchTable {
   PFN_vkDestroyPipeline destroyPipeline = nullptr;
   PFN_vkCreateDescriptorPool createDescriptorPool = nullptr;
   PFN_vkDestroyDescriptorPool destroyDescriptorPool = nullptr;
+  PFN_vkResetDescriptorPool resetDescriptorPool = nullptr;
   PFN_vkAllocateDescriptorSets allocateDescriptorSets = nullptr;
   PFN_vkUpdateDescriptorSets updateDescriptorSets = nullptr;
   PFN_vkCreateBufferView createBufferView = nullptr;

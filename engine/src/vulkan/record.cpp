@@ -70,13 +70,16 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
        {BufferRole::normals, "normals"},
        {BufferRole::tangents, "tangents"},
        {BufferRole::previousPositions, "previous positions"}}};
+  const OutputBuffers& given = buffers.outputs;
+  const std::array<const BufferRange*, streamCount> ranges{
+      &given.positions, &given.normals, &given.tangents, &given.previousPositions};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const bool isWritten =
-        std::any_of(plan.variants().begin(), plan.variants().end(),
-                    [&](const Variant& variant) { return writesStream(variant, stream); });
+    const bool isWritten = std::ranges::any_of(plan.variants(), [&](const Variant& variant) {
+      return variant.kernel == Kernel::skin && writesStream(variant, stream);
+    });
     if (!isWritten) continue;
     if (Result<void> good =
-            checkBuffer(plan, outputs[stream].first, output(stream), outputs[stream].second);
+            checkBuffer(plan, outputs[stream].first, *ranges[stream], outputs[stream].second);
         !good)
       return good;
   }
@@ -106,15 +109,6 @@ Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
   return {};
 }
 
-Result<void> BindingsState::checkVariants(const Plan& plan) const {
-  for (const Variant& variant : plan.variants()) {
-    if (context->pipelines->find(variant) == VK_NULL_HANDLE)
-      return Error{ErrorCode::notPrepared,
-                   describe(variant) + " has no pipeline; call Context::prepare for it first"};
-  }
-  return {};
-}
-
 Result<void> BindingsState::check(const Plan& plan) const {
   if (Result<void> good = checkBuffers(plan); !good) return good;
   if (!plan.commands().empty() && plan.limits() != context->limits) {
@@ -123,7 +117,23 @@ Result<void> BindingsState::check(const Plan& plan) const {
         "the plan was made for the limits of another device; pass Context::limits() to makePlan"};
   }
   if (Result<void> good = checkOneBuffer(plan); !good) return good;
-  return checkVariants(plan);
+  return context->check(plan, bound, sets);
+}
+
+Result<void> ContextState::check(const Plan& plan, const BoundBuffers& buffers,
+                                 DescriptorSets& sets) const {
+  for (const Variant& variant : plan.variants()) {
+    if (pipelines->find(variant) == VK_NULL_HANDLE)
+      return Error{ErrorCode::notPrepared,
+                   describe(variant) + " has no pipeline; call Context::prepare for it first"};
+  }
+  if (pushesDescriptors()) return {};
+  for (const Command& command : plan.commands()) {
+    const auto* dispatch = std::get_if<DispatchCommand>(&command);
+    if (dispatch == nullptr) continue;
+    if (Result<void> made = sets.make({*this, *dispatch, buffers}); !made) return made;
+  }
+  return {};
 }
 
 namespace {
@@ -157,12 +167,14 @@ Scope scopeOf(Access accesses) {
 /// Records one command after the other.
 class Recorder {
  public:
-  Recorder(VkCommandBuffer commandBuffer, const BindingsState& bound, const FrameBuffers* frame)
+  Recorder(VkCommandBuffer commandBuffer, const ContextState& context, const BoundBuffers& buffers,
+           const DescriptorSets& sets, Staging* staging)
       : commandBuffer_(commandBuffer),
-        bound_(bound),
-        context_(*bound.context),
-        table_(bound.context->table),
-        frame_(frame) {}
+        context_(context),
+        table_(context.table),
+        buffers_(buffers),
+        sets_(sets),
+        staging_(staging) {}
 
   void operator()(const BarrierCommand& barrier) {
     const Scope before = scopeOf(barrier.before), after = scopeOf(barrier.after);
@@ -173,36 +185,36 @@ class Recorder {
   }
 
   void operator()(const ClearCommand& clear) {
-    const BufferRange range = rangeOf(clear.buffer);
-    table_.cmdFillBuffer(commandBuffer_, range.buffer, range.offset + clear.offset, clear.size, 0);
+    const BufferRange& range = buffers_[clear.part.buffer].range;
+    table_.cmdFillBuffer(commandBuffer_, range.buffer, range.offset + clear.part.offset,
+                         clear.part.size, 0);
   }
 
-  /// Copies with the same buffers are recorded in one call.
-  std::span<const Command> copy(std::span<const Command> commands) {
-    const auto& first = std::get<CopyCommand>(commands.front());
-    const BufferRange from = rangeOf(first.from), to = rangeOf(first.to);
-    std::array<VkBufferCopy, 64> regions;
-    std::uint32_t count = 0;
-    while (count < regions.size() && count < commands.size()) {
-      const auto* next = std::get_if<CopyCommand>(&commands[count]);
-      if (next == nullptr || next->from != first.from || next->to != first.to) break;
-      regions[count++] = {from.offset + next->fromOffset, to.offset + next->toOffset, next->size};
-    }
-    table_.cmdCopyBuffer(commandBuffer_, from.buffer, to.buffer, count, regions.data());
-    ++recorded_.copies;
-    return commands.subspan(count);
+  void operator()(const CopyCommand& copy) {
+    const BufferRange &from = buffers_[copy.from].range, &to = buffers_[copy.to].range;
+    addCopy(from.buffer, to.buffer,
+            {from.offset + copy.fromOffset, to.offset + copy.toOffset, copy.size});
+  }
+
+  void operator()(const UploadCommand& upload) {
+    const BufferRange& to = buffers_[upload.to.buffer].range;
+    std::ranges::copy(upload.bytes,
+                      staging_->bytes.begin() + static_cast<std::ptrdiff_t>(staging_->used));
+    addCopy(staging_->buffer, to.buffer,
+            {staging_->used, to.offset + upload.to.offset, upload.to.size});
+    staging_->used += upload.to.size;
   }
 
   void operator()(const DispatchCommand& dispatch) {
     table_.cmdBindPipeline(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
                            context_.pipelines->find(dispatch.variant));
-    bindBuffers(dispatch);
+    bind({context_, dispatch, buffers_});
     table_.cmdPushConstants(commandBuffer_, context_.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                             dispatch.constantCount * 4, dispatch.constants.data());
     ++recorded_.dispatches;
     recorded_.workgroups += dispatch.workgroupCount;
     if (dispatch.indirectOffset) {
-      const BufferRange& tables = bound_.buffers.tables;
+      const BufferRange& tables = buffers_[dispatch.bindings.front().part.buffer].range;
       table_.cmdDispatchIndirect(commandBuffer_, tables.buffer,
                                  tables.offset + *dispatch.indirectOffset);
     } else {
@@ -210,95 +222,61 @@ class Recorder {
     }
   }
 
+  /// Before a command that is no copy. Copies between the same buffers are recorded in one call.
+  void endCopies() {
+    if (regionCount_ == 0) return;
+    table_.cmdCopyBuffer(commandBuffer_, from_, to_, regionCount_, regions_.data());
+    ++recorded_.copies;
+    regionCount_ = 0;
+  }
+
   const Recorded& recorded() const { return recorded_; }
 
  private:
-  BufferRange rangeOf(BufferRole role) const {
-    switch (role) {
-      case BufferRole::tables:
-        return bound_.buffers.tables;
-      case BufferRole::results:
-        return bound_.buffers.results;
-      case BufferRole::positions:
-        return bound_.buffers.outputs.positions;
-      case BufferRole::upload:
-        return frame_->upload;
-      case BufferRole::readBack:
-        return frame_->readBack;
-      case BufferRole::history:
-        return frame_->history;
-      case BufferRole::counters:
-        return frame_->counters;
-      default:
-        return {};  // no command copies or clears it
-    }
+  void addCopy(VkBuffer from, VkBuffer to, const VkBufferCopy& region) {
+    if (from != from_ || to != to_ || regionCount_ == regions_.size()) endCopies();
+    from_ = from;
+    to_ = to;
+    regions_[regionCount_++] = region;
   }
 
-  BoundBuffers buffersOf(const DispatchCommand& dispatch) const {
-    if (dispatch.variant.kernel == Kernel::palette || dispatch.variant.kernel == Kernel::clear)
-      return bound_.paletteKernel(dispatch.poseBuffer);
-    if (dispatch.variant.kernel == Kernel::visibility) return bound_.visibilityKernel(*frame_);
-    Windows windows;
-    for (std::size_t stream = 0; stream < streamCount; ++stream)
-      windows[stream] = dispatch.windows[stream].index;
-    return bound_.skinKernel(dispatch.joints, windows);
-  }
-
-  void bindBuffers(const DispatchCommand& dispatch) {
+  void bind(const Descriptors& descriptors) {
     if (context_.pushesDescriptors()) {
-      const BoundBuffers buffers = buffersOf(dispatch);
-      const DescriptorWrites writes(buffers);
+      const DescriptorWrites writes(descriptors);
       table_.cmdPushDescriptorSet(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
                                   context_.pipelineLayout, 0, writes.count(), writes.data());
       return;
     }
-    VkDescriptorSet set = VK_NULL_HANDLE;
-    if (dispatch.variant.kernel == Kernel::visibility) {
-      set = frame_->visibilitySet;
-      if (!visibilityIsWritten_) {
-        const BoundBuffers buffers = buffersOf(dispatch);
-        const DescriptorWrites writes(buffers, set);
-        table_.updateDescriptorSets(context_.device, writes.count(), writes.data(), 0, nullptr);
-      }
-      visibilityIsWritten_ = true;
-    } else if (dispatch.variant.kernel == Kernel::palette ||
-               dispatch.variant.kernel == Kernel::clear) {
-      set = bound_.sets[dispatch.poseBuffer];
-    } else {
-      set = bound_.sets[bound_.skinSet(dispatch.joints, bound_.commonWindow(dispatch))];
-    }
+    const VkDescriptorSet set = sets_.find(descriptors);
     table_.cmdBindDescriptorSets(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
                                  context_.pipelineLayout, 0, 1, &set, 0, nullptr);
   }
 
   VkCommandBuffer commandBuffer_;
-  const BindingsState& bound_;
   const ContextState& context_;
   const DispatchTable& table_;
-  const FrameBuffers* frame_;
-  bool visibilityIsWritten_ = false;
+  const BoundBuffers& buffers_;
+  const DescriptorSets& sets_;
+  Staging* staging_;
+  VkBuffer from_ = VK_NULL_HANDLE, to_ = VK_NULL_HANDLE;  ///< of the copies that are collected
+  std::array<VkBufferCopy, 64> regions_;
+  std::uint32_t regionCount_ = 0;
   Recorded recorded_;
 };
 
 }  // namespace
 
-Recorded recordCommands(VkCommandBuffer commandBuffer, const Plan& plan, const BindingsState& bound,
-                        const FrameBuffers* frame) {
-  Recorder recorder(commandBuffer, bound, frame);
-  for (std::span<const Command> commands = plan.commands(); !commands.empty();) {
-    if (std::holds_alternative<CopyCommand>(commands.front())) {
-      commands = recorder.copy(commands);
-      continue;
-    }
-    if (const auto* dispatch = std::get_if<DispatchCommand>(&commands.front())) {
-      recorder(*dispatch);
-    } else if (const auto* barrier = std::get_if<BarrierCommand>(&commands.front())) {
-      recorder(*barrier);
-    } else if (const auto* clear = std::get_if<ClearCommand>(&commands.front())) {
-      recorder(*clear);
-    }
-    commands = commands.subspan(1);
+Recorded recordCommands(VkCommandBuffer commandBuffer, const ContextState& context,
+                        const Plan& plan, const BoundBuffers& buffers, const DescriptorSets& sets,
+                        Staging* staging) {
+  Recorder recorder(commandBuffer, context, buffers, sets, staging);
+  for (const Command& command : plan.commands()) {
+    const bool copies = std::holds_alternative<CopyCommand>(command) ||
+                        std::holds_alternative<UploadCommand>(command);
+    if (!copies) recorder.endCopies();
+    std::visit([&recorder](const auto& one) { recorder(one); }, command);
   }
+  recorder.endCopies();
   return recorder.recorded();
 }
 
@@ -308,14 +286,10 @@ Result<void> Context::record(VkCommandBuffer commandBuffer, const Plan& plan,
   if (bindings.state_ == nullptr || bindings.state_->context != &context) {
     return Error{ErrorCode::invalidArgument, "the bindings were not made by this context"};
   }
-  if (plan.buffer(BufferRole::readBack).size != 0) {
-    return Error{ErrorCode::invalidArgument,
-                 "the plan is for a scene: its commands use buffers that bindings do not have"};
-  }
   const BindingsState& bound = *bindings.state_;
   if (Result<void> good = bound.check(plan); !good) return good;
   const Label label(context.table, commandBuffer, "dermis: skin a batch");
-  recordCommands(commandBuffer, plan, bound, nullptr);
+  recordCommands(commandBuffer, context, plan, bound.bound, bound.sets);
   return {};
 }
 

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
-#include <optional>
+#include <mutex>
+#include <span>
 #include <vector>
 
 #include <vulkan/vulkan_core.h>
@@ -15,6 +18,9 @@
 #include "vulkan/pipelines.h"
 
 namespace dermis::vulkan {
+
+struct DescriptorSets;
+struct BoundBuffer;
 
 struct ContextState {
   explicit ContextState(const DeviceDescription& description)
@@ -40,13 +46,10 @@ struct ContextState {
   Result<void> createLayouts();
   Result<void> prepare(std::span<const Variant> variants) const;
   Result<void> prepare(const PipelineNeeds& needs, const Tuning& withTuning) const;
-  /// Without push descriptors: creates a pool and allocates descriptor sets from it. The caller
-  /// must destroy the pool even if this fails.
-  Result<void> allocateSets(std::uint32_t count, VkDescriptorPool& pool,
-                            std::vector<VkDescriptorSet>& sets) const;
-  /// `poseBuffers`: of a scene, those that the palette kernel reads.
-  Result<Bindings> createBindings(const BatchBuffers& buffers,
-                                  std::vector<BufferRange> poseBuffers = {}) const;
+  /// Whether there is a pipeline for each dispatch. Without push descriptors it also makes their
+  /// sets.
+  Result<void> check(const Plan& plan, const std::vector<BoundBuffer>& buffers,
+                     DescriptorSets& sets) const;
 
   VkInstance instance;
   PFN_vkGetInstanceProcAddr getInstanceProcAddr;
@@ -63,71 +66,85 @@ struct ContextState {
   std::unique_ptr<Pipelines> pipelines;
 };
 
-/// The buffers of a kernel's bindings, by binding number.
-struct BoundBuffers {
+/// A buffer that commands name, and the views through which kernels read it.
+struct BoundBuffer {
+  BufferRange range;
+  VkBufferView units = VK_NULL_HANDLE;  ///< of 16 bytes
+  VkBufferView words = VK_NULL_HANDLE;  ///< of 4 bytes
+};
+
+/// The buffers of a plan, by number.
+using BoundBuffers = std::vector<BoundBuffer>;
+
+/// Creates the views that kernels for CPU devices need of a buffer with this role; none for other
+/// devices.
+Result<void> createTexelViews(const ContextState& context, BufferRole role, bool isScene,
+                              BoundBuffer& buffer);
+void destroyTexelViews(const ContextState& context, BoundBuffer& buffer);
+
+/// The descriptors of a dispatch, by binding number.
+struct Descriptors {
+  Descriptors(const ContextState& context, const DispatchCommand& dispatch,
+              const BoundBuffers& buffers);
+
   std::array<VkDescriptorBufferInfo, abi::BINDING_COUNT> buffers{};
   std::array<VkBufferView, abi::TEXEL_BINDING_COUNT> texels{};  ///< from BINDING_COUNT on
 };
 
-/// The windows of the four outputs that a kernel sees.
-using Windows = std::array<std::uint32_t, streamCount>;
+/// Descriptor sets, for devices without push descriptors. Any thread may call `make` and `find`.
+struct DescriptorSets {
+  DescriptorSets() = default;
+  ~DescriptorSets();
+  DescriptorSets(DescriptorSets&& other) noexcept;
+  DescriptorSets& operator=(DescriptorSets&&) = delete;
 
-/// Buffers that commands of a scene use besides the bound ones.
-struct FrameBuffers {
-  BufferRange upload, readBack, visibility, history, counters;
-  /// For the visibility kernel, without push descriptors. `recordCommands` writes the set: the
-  /// frame that used it last must be complete.
-  VkDescriptorSet visibilitySet = VK_NULL_HANDLE;
+  /// Makes the set unless it exists.
+  Result<void> make(const Descriptors& descriptors);
+  /// One that `make` made.
+  VkDescriptorSet find(const Descriptors& descriptors) const;
+  /// Forgets all sets: the GPU has completed all commands that use them. No set is written twice:
+  /// one that kept descriptors which the next dispatch does not use could name what has gone.
+  void reset();
+
+  const ContextState* context = nullptr;
+
+ private:
+  struct Pool {
+    VkDescriptorPool pool;
+    std::uint32_t count, left;  ///< sets
+  };
+  struct Made {
+    Descriptors descriptors;
+    VkDescriptorSet set;
+  };
+  Result<void> addPool(std::uint32_t count);
+  VkDescriptorSet findMade(const Descriptors& descriptors) const;
+
+  mutable std::mutex mutex_;
+  std::vector<Pool> pools_;
+  std::vector<Made> made_;
 };
 
 struct BindingsState {
   ~BindingsState();
-
-  const ContextState* context = nullptr;
-  BatchBuffers buffers;
-  std::vector<BufferRange> poseBuffers;  ///< of a batch: the only one
-  std::uint64_t windowStep = 0;
-  /// Views of the buffers that kernels read through texel buffers, if they do.
-  VkBufferView tableTexels = VK_NULL_HANDLE;
-  VkBufferView meshTexels = VK_NULL_HANDLE;
-  VkBufferView meshWords = VK_NULL_HANDLE;
-  VkBufferView matrixTexels = VK_NULL_HANDLE;
-  VkBufferView paletteTexels = VK_NULL_HANDLE;
-
-  const BufferRange& output(std::size_t stream) const;
-  std::uint32_t windowCount(std::size_t stream) const;
-
-  /// The buffers that each kernel sees. Bindings that a variant does not use are bound to a buffer
-  /// that it uses, since all descriptors that the module declares must be valid.
-  BoundBuffers paletteKernel(std::uint32_t poseBuffer) const;
-  BoundBuffers skinKernel(BufferRole joints, const Windows& windows) const;
-  BoundBuffers visibilityKernel(const FrameBuffers& frame) const;
-
-  Result<void> createTexelViews();
-
-  // Without push descriptors: a set of the palette kernel for each pose buffer; then, for each
-  // window number, two sets of the skin kernel: one with poses and one with palettes. All outputs
-  // of a set are bound at the window of that number, or at their last one.
-  VkDescriptorPool pool = VK_NULL_HANDLE;
-  std::vector<VkDescriptorSet> sets;
-
-  std::uint32_t mostWindows() const;
-  std::size_t skinSet(BufferRole joints, std::uint32_t window) const {
-    return poseBuffers.size() + std::size_t{window} * 2 + (joints == BufferRole::poses ? 0 : 1);
-  }
-  /// The window number of all outputs of a dispatch that have several windows. They must have the
-  /// same one, as they do if `DeviceLimits::separateRanges` is false.
-  static std::uint32_t commonWindow(const DispatchCommand& dispatch);
-
   /// Whether a plan can be recorded with these buffers and the existing pipelines.
   Result<void> check(const Plan& plan) const;
 
-  Result<void> createSets();
+  const ContextState* context = nullptr;
+  BatchBuffers buffers;
+  BoundBuffers bound;
+  mutable DescriptorSets sets;
 
  private:
   Result<void> checkBuffers(const Plan& plan) const;
   Result<void> checkOneBuffer(const Plan& plan) const;
-  Result<void> checkVariants(const Plan& plan) const;
+};
+
+/// Where the bytes of uploads are put for the GPU to copy them, one after the other.
+struct Staging {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  std::span<std::byte> bytes;
+  std::uint64_t used = 0;
 };
 
 /// What was recorded.
@@ -137,12 +154,10 @@ struct Recorded {
   std::uint32_t copies = 0;      ///< calls of vkCmdCopyBuffer
 };
 
-/// Records the commands of a plan that passed `BindingsState::check`. `frame` is for plans of a
-/// scene.
-Recorded recordCommands(VkCommandBuffer commandBuffer, const Plan& plan, const BindingsState& bound,
-                        const FrameBuffers* frame);
-
-/// Whether a kernel writes an attribute.
-bool writesStream(const Variant& variant, std::size_t stream);
+/// Records the commands of a plan that passed `ContextState::check`. `staging` has room for all its
+/// uploads; null for a batch, which has none.
+Recorded recordCommands(VkCommandBuffer commandBuffer, const ContextState& context,
+                        const Plan& plan, const BoundBuffers& buffers, const DescriptorSets& sets,
+                        Staging* staging = nullptr);
 
 }  // namespace dermis::vulkan

@@ -1,5 +1,5 @@
 // A film of a crowd: figures stand and wave, others walk around them in rings, and a camera flies
-// over and through them. It draws straight from the output buffer of a SkinningSystem, in the
+// over and through them. It draws straight from the output buffer of a SceneRecorder, in the
 // command buffer that skinned it. Figures in the distance are skinned less often, figures out of
 // the picture not at all.
 //
@@ -22,7 +22,7 @@
 
 #include <glm/trigonometric.hpp>
 
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "gait.h"
 #include "kit/character.h"
 #include "kit/device.h"
@@ -68,25 +68,26 @@ class SkinnedCrowd {
       : context_(&context),
         character_(&character),
         stroll_(&stroll),
-        system_(create(context, character, stroll)) {
+        recorder_(create(context, character, stroll)) {
     std::vector<MeshHandle> meshes;
-    for (const Part& part : character.parts()) meshes.push_back(must(system_.addMesh(part.packed)));
+    for (const Part& part : character.parts())
+      meshes.push_back(must(recorder_.scene().addMesh(part.packed)));
     for (std::uint32_t index = 0; index < stroll.count(); ++index) {
       Figure& figure = figures_.emplace_back();
       for (const std::uint32_t jointCount : character.jointCounts())
-        figure.poses.push_back(must(system_.addPose(jointCount)));
+        figure.poses.push_back(must(recorder_.scene().addPose(jointCount)));
       for (std::size_t part = 0; part < meshes.size(); ++part) {
         InstanceDescription description = describe(character.parts()[part]);
         description.mesh = meshes[part];
         description.pose = figure.poses[character.parts()[part].skin];
-        if (index == 0) must(system_.prepare(description));
-        figure.instances.push_back(must(system_.addInstance(description)));
+        if (index == 0) must(recorder_.prepare(description));
+        figure.instances.push_back(must(recorder_.scene().addInstance(description)));
       }
     }
   }
 
   void skinFrame(std::uint64_t frame, std::uint64_t completedFrame, VkCommandBuffer commandBuffer) {
-    must(system_.beginFrame(frame, completedFrame));
+    must(recorder_.scene().beginFrame(frame, completedFrame));
     std::vector<InstanceVisibility> visibility;
     for (std::uint32_t index = 0; index < figures_.size(); ++index) {
       Figure& figure = figures_[index];
@@ -94,17 +95,17 @@ class SkinnedCrowd {
       for (const InstanceHandle instance : figure.instances)
         visibility.push_back({instance, figure.now.isInView, figure.now.updateInterval});
     }
-    must(system_.setVisibility(visibility));
+    must(recorder_.scene().setVisibility(visibility));
     for (const Figure& figure : figures_) {
-      if (!must(system_.isDue(figure.instances.front()))) continue;
+      if (!must(recorder_.scene().isDue(figure.instances.front()))) continue;
       for (std::uint32_t skin = 0; skin < figure.poses.size(); ++skin) {
-        const std::span<JointMatrix> pose = must(system_.writePose(figure.poses[skin]));
+        const std::span<JointMatrix> pose = must(recorder_.scene().writePose(figure.poses[skin]));
         std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
       }
     }
     context_->recordBarrier(commandBuffer,
                             vulkan::barrierBetween(vulkan::Use::vertexInput, vulkan::Use::dermis));
-    must(system_.record(commandBuffer));
+    must(recorder_.record(commandBuffer));
     context_->recordBarrier(commandBuffer,
                             vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::vertexInput));
   }
@@ -122,9 +123,9 @@ class SkinnedCrowd {
 
   /// What draws the vertices of a part of a figure.
   render::Draw draw(std::uint32_t figure, std::uint32_t part) const {
-    const InstanceOutput output = must(system_.output(figures_[figure].instances[part]));
+    const InstanceOutput output = must(recorder_.scene().output(figures_[figure].instances[part]));
     const auto stream = [&](const OutputAttribute& attribute) -> render::VertexStream {
-      return {system_.outputBuffer(), attribute.offset, attribute.stride, attribute.format};
+      return {recorder_.outputBuffer(), attribute.offset, attribute.stride, attribute.format};
     };
     render::Draw draw;
     draw.positions = stream(output.positions);
@@ -147,25 +148,24 @@ class SkinnedCrowd {
     return description;
   }
 
-  static vulkan::SkinningSystem create(vulkan::Context& context, const Character& character,
-                                       const Stroll& stroll) {
-    vulkan::SkinningSystemDescription description;
-    description.context = &context;
-    description.framesInFlight = framesInFlight;
-    description.instanceCapacity.initial = stroll.count() * character.parts().size();
+  static vulkan::SceneRecorder create(vulkan::Context& context, const Character& character,
+                                      const Stroll& stroll) {
+    vulkan::SceneRecorderDescription description;
+    description.scene.framesInFlight = framesInFlight;
+    description.scene.instanceCapacity.initial = stroll.count() * character.parts().size();
     std::uint64_t joints = 0, outputBytes = 0;
     for (const std::uint32_t count : character.jointCounts()) joints += count;
     for (const Part& part : character.parts())
       outputBytes += must(placeVertices(describe(part).layout, part.packed.vertexCount())).size;
-    description.jointCapacity.initial = stroll.count() * joints;
-    description.outputCapacity.initial = stroll.count() * outputBytes;
-    return must(vulkan::SkinningSystem::create(description));
+    description.scene.jointCapacity.initial = stroll.count() * joints;
+    description.scene.outputCapacity.initial = stroll.count() * outputBytes;
+    return must(vulkan::SceneRecorder::create(context, description));
   }
 
   const vulkan::Context* context_;
   const Character* character_;
   const Stroll* stroll_;
-  vulkan::SkinningSystem system_;
+  vulkan::SceneRecorder recorder_;
   std::vector<Figure> figures_;
 };
 

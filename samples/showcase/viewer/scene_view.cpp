@@ -199,7 +199,7 @@ Result<void> SceneView::recordSkinning(VkCommandBuffer commandBuffer, const Shot
   if (!isNew) return {};
   skinning_.recordEnd(commandBuffer);
   hasSkinned_ = true;
-  const vulkan::FrameStatistics last = drawn_->statistics().lastFrame;
+  const vulkan::RecorderStatistics last = drawn_->statistics();
   times_.planSeconds = last.planSeconds + last.recordSeconds;
   return {};
 }

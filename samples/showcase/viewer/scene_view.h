@@ -69,7 +69,7 @@ Result<PositionErrors> positionErrors(const cli::Scene& scene, const cli::SceneP
 struct SceneTimes {
   double skinningSeconds = 0;  ///< GPU time of the last skinning
   double drawingSeconds = 0;   ///< GPU time
-  double planSeconds = 0;      ///< CPU time of `SkinningSystem::record` at the last skinning
+  double planSeconds = 0;      ///< CPU time of `SceneRecorder::record` at the last skinning
 };
 
 /// Handles one picture at a time: recorded commands must be complete before the next call that is

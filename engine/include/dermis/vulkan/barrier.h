@@ -3,7 +3,7 @@
 // state of resources.
 //
 //   context.recordBarrier(commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
-//   context.record(commandBuffer, plan, bindings);  // or SkinningSystem::record
+//   context.record(commandBuffer, plan, bindings);  // or SceneRecorder::record
 //   context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
 #pragma once
 
@@ -16,24 +16,24 @@ namespace dermis::vulkan {
 
 /// How commands use a buffer. Combine uses by `|`.
 enum class Use : std::uint32_t {
-  /// All that `record` reads and writes. A SkinningSystem orders its own `record`s; between two
+  /// All that `record` reads and writes. A SceneRecorder orders its own `record`s; between two
   /// calls of `Context::record` with the same buffers, the engine records a barrier.
-  dermis = 0x1,
-  vertexInput = 0x2,   ///< draws, as a vertex buffer
-  vertexShader = 0x4,  ///< this and the next four: as a storage or texel buffer that is only read
-  fragmentShader = 0x8,
-  taskShader = 0x10,  ///< of VK_EXT_mesh_shader
-  meshShader = 0x20,
-  rayTracing = 0x40,                  ///< any shader of a ray-tracing pipeline
-  accelerationStructureBuild = 0x80,  ///< the geometry of a build or refit
-  computeRead = 0x100,                ///< by compute shaders of the engine
-  computeWrite = 0x200,
-  copyRead = 0x400,   ///< vkCmdCopyBuffer
-  copyWrite = 0x800,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
-  hostRead = 0x1000,  ///< through a mapping, after a fence
+  dermis = 1,
+  vertexInput = 2,   ///< draws, as a vertex buffer
+  vertexShader = 4,  ///< this and the next four: as a storage or texel buffer that is only read
+  fragmentShader = 8,
+  taskShader = 16,  ///< of VK_EXT_mesh_shader
+  meshShader = 32,
+  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline
+  accelerationStructureBuild = 128,  ///< the geometry of a build or refit
+  computeRead = 256,                 ///< by compute shaders of the engine
+  computeWrite = 512,
+  copyRead = 1024,   ///< vkCmdCopyBuffer
+  copyWrite = 2048,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
+  hostRead = 4096,   ///< through a mapping, after a fence
   /// Through a mapping. What is written before the submission needs no barrier: vkQueueSubmit makes
   /// it visible.
-  hostWrite = 0x2000,
+  hostWrite = 8192,
 };
 /// Both uses.
 constexpr Use operator|(Use a, Use b) {
@@ -45,7 +45,7 @@ constexpr Use operator|(Use a, Use b) {
 /// second. Vulkan ignores the destination of a release and the source of an acquire (Vulkan 1.3,
 /// 7.7.4). The host has no queue family: uses by it are left out of a transfer. If no others are
 /// before or after it, all three values give the same barrier.
-enum class QueueTransfer : std::uint8_t { none, release, acquire };
+enum class QueueTransfer : std::uint8_t { none = 0, release = 1, acquire = 2 };
 
 /// Stages and accesses of both sides of a barrier. VkPipelineStageFlags2 and VkAccessFlags2 have
 /// the same bits.

@@ -61,7 +61,7 @@ class DERMIS_VULKAN_API Bindings {
 
  private:
   friend class Context;
-  friend class SkinningSystem;
+  friend class SceneRecorder;
   friend struct ContextState;
   std::unique_ptr<BindingsState> state_;
 };

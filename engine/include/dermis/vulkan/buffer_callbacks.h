@@ -1,4 +1,4 @@
-// Two functions by which a SkinningSystem creates its buffers with the engine's allocator.
+// Two functions by which a SceneRecorder creates its buffers with the engine's allocator.
 #pragma once
 
 #include <cstdint>
@@ -39,13 +39,13 @@ struct CreatedBuffer {
   void* allocation = nullptr;  ///< for the engine's allocator; `destroy` gets it
 };
 
-/// Create and destroy the buffers of a SkinningSystem. They are called in the thread that calls the
-/// SkinningSystem, and may call Vulkan. They must not throw, and must not call the SkinningSystem.
+/// Create and destroy the buffers of a SceneRecorder. They are called in the thread that calls the
+/// recorder or its scene, and may call Vulkan. They must not throw, and must not call either.
 /// With the Vulkan Memory Allocator, `create` calls
 /// vmaCreateBuffer with `info`, and `destroy` calls vmaDestroyBuffer.
 struct BufferCallbacks {
   void* user = nullptr;  ///< passed to both functions
-  /// Creates a buffer and binds memory to it. If it fails, the function of the SkinningSystem fails
+  /// Creates a buffer and binds memory to it. If it fails, the function that needs it fails
   /// with the same error.
   Result<CreatedBuffer> (*create)(void* user, const BufferRequest& request) = nullptr;
   /// Destroys a buffer that the GPU no longer uses, and frees its memory.

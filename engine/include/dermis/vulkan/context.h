@@ -133,7 +133,7 @@ class DERMIS_VULKAN_API Context {
   /// pipelines that `prepare` creates on another thread during the call are created again.
   ///
   /// `frame` is the frame that is recorded next, `completedFrame` the last frame that the GPU has
-  /// completed: as for `SkinningSystem::beginFrame`, even if there is no system. Once `frame` is
+  /// completed: as for `Scene::beginFrame`, even if there is no scene. Once `frame` is
   /// complete, the next call, with or without modules, destroys the replaced pipelines. Command
   /// buffers that were recorded before must not be submitted again after `frame`. Other threads may
   /// record during the call, for `frame` or an earlier frame; each of their dispatches uses either
@@ -178,7 +178,7 @@ class DERMIS_VULKAN_API Context {
  private:
   Context();
   friend class Bindings;
-  friend class SkinningSystem;
+  friend class SceneRecorder;
   std::unique_ptr<ContextState> state_;
 };
 

@@ -9,4 +9,4 @@
 #include "dermis/vulkan/context.h"
 #include "dermis/vulkan/handles.h"
 #include "dermis/vulkan/kernels.h"
-#include "dermis/vulkan/skinning_system.h"
+#include "dermis/vulkan/scene_recorder.h"

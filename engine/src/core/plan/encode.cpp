@@ -46,6 +46,7 @@ void setBox(abi::ExtensionRecord& extension, const Box& box) {
 
 void PlanData::clear() {
   commands.clear();
+  bindings.clear();
   variants.clear();
   tables.clear();
   for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
@@ -53,11 +54,10 @@ void PlanData::clear() {
   sizes = {};
   instanceCount = 0;
   vertexCount = 0;
-  candidateCount = 0;
 }
 
 Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
-                             const PlanSizes& sizes, PlanData& plan, const FrameWork* frame) {
+                             const PlanSizes& sizes, PlanData& plan, std::uint32_t record) {
   plan_ = &plan;
   work_ = &work;
   limits_ = limits;
@@ -73,26 +73,11 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   if (!work.culled.empty()) {
     appendCandidates();
     appendCulledDispatches();
-    if (Result<void> good = addVisibilityDispatches(frame->frame); !good) return good;
-  } else {
-    plan_->sizes.slots = 0;
+    if (Result<void> good = addVisibilityDispatches(record); !good) return good;
   }
-  if (plan_->tables.size() * 4 > limits_.maxStorageBufferRange) {
-    return tooLargeForRange("tables", plan_->tables.size() * 4, limits_);
-  }
-  plan_->instanceCount = static_cast<std::uint32_t>(work.instances.size());
-  plan_->candidateCount = static_cast<std::uint32_t>(work.culled.size());
-  if (frame != nullptr) {
-    listFrame(*frame);
-  } else {
-    listDispatches();
-  }
-  for (const Command& command : plan_->commands) {
-    const auto* dispatch = std::get_if<DispatchCommand>(&command);
-    if (dispatch != nullptr &&
-        std::ranges::find(plan_->variants, dispatch->variant) == plan_->variants.end())
-      plan_->variants.push_back(dispatch->variant);
-  }
+  if (plan.tables.size() * 4 > limits.maxStorageBufferRange)
+    return tooLargeForRange("tables", plan.tables.size() * 4, limits);
+  plan.instanceCount = static_cast<std::uint32_t>(work.instances.size());
   return {};
 }
 
@@ -153,9 +138,8 @@ Result<void> Encoder::addPaletteDispatch(const Variant& variant,
   std::memcpy(&tables[first], records.data(), records.size_bytes());
   if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0}); !good)
     return good;
-  DispatchCommand& dispatch = dispatches_.back().command;
-  dispatch.joints = joints;
-  dispatch.poseBuffer = buffer;
+  dispatches_.back().joints = joints;
+  dispatches_.back().poseBuffer = buffer;
   return {};
 }
 
@@ -258,12 +242,9 @@ Result<void> Encoder::addDispatches() {
                              verticesPerInvocation_};
     if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
     Dispatch& dispatch = dispatches_.back();
-    for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      const std::uint32_t window = group.key.windows[stream];
-      dispatch.command.windows[stream] = {window, window * outputWindowStep(limits_)};
-    }
+    dispatch.windows = group.key.windows;
     const bool readsPoses = variant.method == Method::linear && !plan_->sizes.isScene;
-    dispatch.command.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
+    dispatch.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
     // A kernel that may name the results counts as one that reads them.
     dispatch.isAfterPalettes =
         palettesRun && (!readsPoses || variant.motion != Motion::none || hasResults(variant));
@@ -426,23 +407,23 @@ void Encoder::appendCulledDispatches() {
     dispatch.groupCountX = dispatch.groupCountY = dispatch.workgroupCount = 0;
     dispatch.indirectOffset = (culled_.arguments + index * abi::INDIRECT_WORDS) * 4;
   }
-  visibility_[1].workgroupCount = static_cast<std::uint32_t>(count);
+  visibility_[1].command.workgroupCount = static_cast<std::uint32_t>(count);
 }
 
 /// First pass: a workgroup for each group. Second pass: one for each indirect dispatch.
-Result<void> Encoder::addVisibilityDispatches(std::uint32_t frame) {
-  visibility_[0].workgroupCount = culledGroups_;
-  const std::uint32_t most = std::max(culledGroups_, visibility_[1].workgroupCount);
+Result<void> Encoder::addVisibilityDispatches(std::uint32_t record) {
+  visibility_[0].command.workgroupCount = culledGroups_;
+  const std::uint32_t most = std::max(culledGroups_, visibility_[1].command.workgroupCount);
   if (most > limits_.maxWorkgroupCountX) {
     return Error{ErrorCode::limitExceeded,
                  "instances that are culled on the GPU have " + std::to_string(most) +
                      " combinations of mesh and layout, but the device allows at most " +
                      std::to_string(limits_.maxWorkgroupCountX) + " workgroups"};
   }
-  culled_.frame = frame;
+  culled_.frame = record;
   culled_.maxWorkgroups = limits_.maxWorkgroupCountX;
   for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
-    DispatchCommand& dispatch = visibility_[pass];
+    DispatchCommand& dispatch = visibility_[pass].command;
     dispatch.variant = visibilityVariant(tuning_);
     dispatch.groupCountX = dispatch.workgroupCount;
     dispatch.groupCountY = 1;
@@ -460,56 +441,155 @@ constexpr Access computeBoth = Access::computeRead | Access::computeWrite;
 
 }  // namespace
 
-void Encoder::listDispatches() {
+/// Lists what the kernel reads and writes. A descriptor that its module declares must be valid even
+/// if the variant does not use it, so such a slot gets a buffer that the kernel reads anyway.
+void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers) {
+  const Variant& variant = dispatch.command.variant;
+  std::array<BufferPart, abi::BINDING_COUNT> parts;
+  const auto orElse = [](const BufferPart& part, const BufferPart& other) {
+    return part.size != 0 ? part : other;
+  };
+  const BufferPart& tables = buffers[BufferRole::tables];
+  const BufferPart& results = buffers[BufferRole::results];
+  const bool readsPoses = dispatch.joints != BufferRole::palettes;
+  const BufferPart& joints = readsPoses && !buffers.poses.empty()
+                                 ? buffers.poses[dispatch.poseBuffer]
+                                 : buffers[dispatch.joints];
+  parts[abi::BINDING_TABLES] = tables;
+  if (variant.kernel == Kernel::visibility) {
+    parts[abi::BINDING_VISIBILITY] = buffers[BufferRole::visibility];
+    parts[abi::BINDING_HISTORY] = buffers[BufferRole::history];
+    parts[abi::BINDING_COUNTERS] = buffers[BufferRole::counters];
+    parts[abi::BINDING_RESULTS] = orElse(results, buffers[BufferRole::counters]);
+  } else if (variant.kernel == Kernel::skin) {
+    parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
+    parts[abi::BINDING_PALETTES] = joints;
+    const std::uint64_t range = limits_.maxStorageBufferRange;
+    const std::uint64_t step = outputWindowStep(limits_);
+    const std::uint32_t common = std::ranges::max(dispatch.windows);
+    for (std::size_t stream = 0; stream < streamCount; ++stream) {
+      BufferPart& part = parts[abi::BINDING_POSITIONS + stream];
+      part = parts[abi::BINDING_POSITIONS];
+      if (!writesStream(variant, stream)) continue;
+      part = buffers.parts[static_cast<std::size_t>(BufferRole::positions) + stream];
+      if (part.size > range) {
+        // Without separate ranges all outputs that have several windows have the same one.
+        const std::uint64_t begin =
+            (limits_.separateRanges ? dispatch.windows[stream] : common) * step;
+        part.offset = std::min(begin, (part.size - 1) / step * step);
+        part.size = std::min(part.size - part.offset, range);
+      }
+    }
+    // Not an output: the validation layer would report results that are read there and that another
+    // dispatch wrote.
+    parts[abi::BINDING_RESULTS] = orElse(results, tables);
+  } else {
+    const BufferPart& palettes = buffers[BufferRole::palettes];
+    parts[abi::BINDING_MESHES] =
+        variant.kernel == Kernel::palette ? orElse(joints, tables) : tables;
+    parts[abi::BINDING_PALETTES] = orElse(palettes, results);
+    parts[abi::BINDING_RESULTS] = orElse(results, palettes);
+  }
+  const std::uint32_t count = limits_.maxStorageBuffersPerStage < storageBuffersWanted
+                                  ? abi::MIN_BINDING_COUNT
+                                  : abi::BINDING_COUNT;
+  for (std::uint32_t slot = 0; slot < count; ++slot) {
+    if (parts[slot].size != 0) plan_->bindings.push_back({slot, 0, parts[slot]});
+  }
+  if (variant.texels) {
+    const auto texels = [&](std::uint32_t slot, std::uint32_t size, const BufferPart& part) {
+      if (part.size >= size) plan_->bindings.push_back({slot, size, part});
+    };
+    texels(abi::BINDING_TABLE_TEXELS, 16, tables);
+    texels(abi::BINDING_MESH_TEXELS, 16, buffers[BufferRole::meshes]);
+    texels(abi::BINDING_MESH_WORDS, 4, buffers[BufferRole::meshes]);
+    texels(abi::BINDING_PALETTE_TEXELS, 16, joints);
+  }
+  plan_->commands.emplace_back(dispatch.command);
+}
+
+void Encoder::listDispatches(const PlanBuffers& buffers) {
   bool palettesAreVisible = false;
   for (const Dispatch& dispatch : dispatches_) {
     if (dispatch.isAfterPalettes && !palettesAreVisible) {
       plan_->commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
       palettesAreVisible = true;
     }
-    plan_->commands.emplace_back(dispatch.command);
+    listDispatch(dispatch, buffers);
   }
 }
 
-void Encoder::listFrame(const FrameWork& frame) {
-  if (dispatches_.empty() && frame.moves.empty()) return;
+/// Lists each variant once, and tells dispatches where their bindings are.
+void Encoder::finish() {
+  std::span<const Binding> bindings = plan_->bindings;
+  for (Command& command : plan_->commands) {
+    auto* dispatch = std::get_if<DispatchCommand>(&command);
+    if (dispatch == nullptr) continue;
+    if (std::ranges::find(plan_->variants, dispatch->variant) == plan_->variants.end())
+      plan_->variants.push_back(dispatch->variant);
+    // Each list begins with the tables.
+    std::size_t count = 1;
+    while (count < bindings.size() && bindings[count].slot != abi::BINDING_TABLES) ++count;
+    dispatch->bindings = bindings.first(count);
+    bindings = bindings.subspan(count);
+  }
+}
+
+void Encoder::listBatch(const PlanBuffers& buffers) {
+  listDispatches(buffers);
+  finish();
+}
+
+void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
+  if (dispatches_.empty() && frame.growth.empty() && frame.uploads.empty() && frame.moves.empty())
+    return;
   std::vector<Command>& commands = plan_->commands;
+  const auto append = [&commands](const auto& list) {
+    commands.insert(commands.end(), list.begin(), list.end());
+  };
   const bool culls = !work_->culled.empty();
+  constexpr Access copyBoth = Access::copyRead | Access::copyWrite;
   // Earlier frames have finished reading what this frame overwrites, and their writes are visible.
   commands.emplace_back(
-      BarrierCommand{computeBoth | Access::copyRead | Access::copyWrite | Access::indirectRead,
-                     computeBoth | Access::copyRead | Access::copyWrite});
-  if (!plan_->tables.empty()) {
-    commands.emplace_back(
-        CopyCommand{BufferRole::upload, BufferRole::tables, 0, 0, plan_->tables.size() * 4});
+      BarrierCommand{computeBoth | copyBoth | Access::indirectRead, computeBoth | copyBoth});
+  if (!frame.growth.empty()) {
+    append(frame.growth);
+    commands.emplace_back(BarrierCommand{Access::copyWrite, copyBoth});
   }
-  commands.insert(commands.end(), frame.moves.begin(), frame.moves.end());
-  const auto sizeOf = [this](BufferRole role) {
-    return plan_->sizes.requirement(role, 0, limits_).size;
-  };
-  if (culls)
-    commands.emplace_back(ClearCommand{BufferRole::counters, 0, sizeOf(BufferRole::counters)});
+  if (!plan_->tables.empty()) {
+    BufferPart tables = buffers[BufferRole::tables];
+    tables.size = plan_->tables.size() * 4;
+    commands.emplace_back(UploadCommand{tables, std::as_bytes(std::span(plan_->tables))});
+  }
+  append(frame.uploads);
+  append(frame.moves);
+  const BufferPart& counters = buffers[BufferRole::counters];
+  if (culls) commands.emplace_back(ClearCommand{counters});
+  BufferPart unclear = buffers[BufferRole::history];
   const std::uint64_t clear = frame.clearHistory * std::uint64_t{sizeof(abi::HistoryRecord)};
-  if (culls && clear < sizeOf(BufferRole::history)) {
-    commands.emplace_back(
-        ClearCommand{BufferRole::history, clear, sizeOf(BufferRole::history) - clear});
+  if (culls && clear < unclear.size) {
+    unclear.offset += clear;
+    unclear.size -= clear;
+    commands.emplace_back(ClearCommand{unclear});
   }
   commands.emplace_back(BarrierCommand{Access::copyWrite, computeBoth});
   if (culls) {
-    commands.emplace_back(visibility_[0]);
+    listDispatch(visibility_[0], buffers);
     commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
-    commands.emplace_back(visibility_[1]);
+    listDispatch(visibility_[1], buffers);
     commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth | Access::indirectRead});
   }
-  listDispatches();
-  if (!culls && frame.results.empty()) return;
-  commands.emplace_back(BarrierCommand{Access::computeWrite, Access::copyRead});
-  if (culls) {
-    commands.emplace_back(CopyCommand{BufferRole::counters, BufferRole::readBack, 0,
-                                      readBackCounters, sizeOf(BufferRole::counters)});
+  listDispatches(buffers);
+  if (culls || !frame.results.empty()) {
+    commands.emplace_back(BarrierCommand{Access::computeWrite, Access::copyRead});
+    if (culls) {
+      commands.emplace_back(CopyCommand{counters.buffer, buffers[BufferRole::readBack].buffer, 0,
+                                        readBackCounters, counters.size});
+    }
+    append(frame.results);
+    commands.emplace_back(BarrierCommand{Access::copyWrite, Access::hostRead});
   }
-  commands.insert(commands.end(), frame.results.begin(), frame.results.end());
-  commands.emplace_back(BarrierCommand{Access::copyWrite, Access::hostRead});
+  finish();
 }
 
 }  // namespace dermis

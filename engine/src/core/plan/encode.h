@@ -15,24 +15,32 @@ namespace dermis {
 
 /// What a frame of a scene does besides skinning.
 struct FrameWork {
-  std::uint32_t frame = 0;               ///< counts records, from 1
-  std::uint32_t clearHistory = 0;        ///< records of the history that are clear, or in use
-  std::span<const CopyCommand> moves;    ///< of outputs
-  std::span<const CopyCommand> results;  ///< to the read-back buffer
+  std::uint32_t clearHistory = 0;          ///< records of the history that are clear, or in use
+  std::span<const CopyCommand> growth;     ///< from buffers to larger ones
+  std::span<const UploadCommand> uploads;  ///< but for the tables
+  std::span<const CopyCommand> moves;      ///< of outputs
+  std::span<const CopyCommand> results;    ///< to the read-back buffer
 };
 
+/// Call `encode`, then one of the functions that list commands.
 class Encoder {
  public:
-  /// Fills the plan with the commands of a batch; with `frame`, with those of a scene. The work was
-  /// arranged. Fails with `limitExceeded` if the tables, or a dispatch, become too large.
+  /// Encodes work that was arranged: the tables, and the dispatches that read them. `record`: of a
+  /// scene, its number, from 1. Fails with `limitExceeded` if the tables, or a dispatch, become too
+  /// large.
   Result<void> encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
-                      const PlanSizes& sizes, PlanData& plan, const FrameWork* frame = nullptr);
+                      const PlanSizes& sizes, PlanData& plan, std::uint32_t record = 0);
+  void listBatch(const PlanBuffers& buffers);
+  void listFrame(const PlanBuffers& buffers, const FrameWork& frame);
 
  private:
   struct Dispatch {
     DispatchCommand command;
     /// It reads what the palette kernel writes, or adds to results that the clear kernel clears.
     bool isAfterPalettes = false;
+    BufferRole joints = BufferRole::palettes;  ///< that the kernel reads
+    std::uint32_t poseBuffer = 0;              ///< of the palette kernel of a scene
+    std::array<std::uint32_t, streamCount> windows{};
   };
 
   Result<void> addPaletteDispatches();
@@ -52,9 +60,10 @@ class Encoder {
   std::uint32_t appendExtension(const InstanceExtras& extras);
   void appendCandidates();
   void appendCulledDispatches();
-  Result<void> addVisibilityDispatches(std::uint32_t frame);
-  void listDispatches();
-  void listFrame(const FrameWork& frame);
+  Result<void> addVisibilityDispatches(std::uint32_t record);
+  void listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers);
+  void listDispatches(const PlanBuffers& buffers);
+  void finish();
 
   PlanData* plan_ = nullptr;
   const Work* work_ = nullptr;
@@ -64,8 +73,8 @@ class Encoder {
   std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
   std::vector<Dispatch> dispatches_;
-  std::array<DispatchCommand, 2> visibility_;  ///< the passes of the visibility kernel
-  abi::VisibilityPush culled_{};               ///< push constants of the visibility kernel
+  std::array<Dispatch, 2> visibility_;  ///< the passes of the visibility kernel
+  abi::VisibilityPush culled_{};        ///< push constants of the visibility kernel
   std::uint32_t culledGroups_ = 0;
 };
 

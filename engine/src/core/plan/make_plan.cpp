@@ -181,6 +181,13 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   addJobs(batch);
   work_.arrange();
   if (Result<void> good = encoder_.encode(work_, limits, tuning, sizes, plan); !good) return good;
+  PlanBuffers buffers;
+  for (std::size_t index = 0; index < bufferRoleCount; ++index) {
+    const auto role = static_cast<BufferRole>(index);
+    const std::uint64_t size = sizes.requirement(role, plan.tables.size() * 4, limits).size;
+    buffers[role] = {static_cast<std::uint32_t>(index), 0, size};
+  }
+  encoder_.listBatch(buffers);
   plan.paletteUnits = paletteUnits_;
   plan.results = results_;
   plan.instanceCount = static_cast<std::uint32_t>(batch.jobs.size());

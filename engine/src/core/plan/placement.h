@@ -55,6 +55,20 @@ inline bool hasResult(const Job& job) {
   return job.bounds || isSnormPosition(job.positions.format);
 }
 
+/// Whether a skin kernel writes an attribute.
+inline bool writesStream(const Variant& variant, std::size_t stream) {
+  switch (static_cast<Stream>(stream)) {
+    case Stream::normals:
+      return variant.normals != VertexFormat::none;
+    case Stream::tangents:
+      return variant.tangents != VertexFormat::none;
+    case Stream::previousPositions:
+      return variant.motion != Motion::none;
+    default:
+      return true;
+  }
+}
+
 // -- Palettes, and variants.
 
 /// The form of a joint in the palettes buffer.

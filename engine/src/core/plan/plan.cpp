@@ -91,10 +91,10 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
       return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0)};
     case BufferRole::poses:
       // In a scene the skin kernel reads palettes only, so poses need no texel buffer usage.
-      if (isScene) return {poses, alignment, storage};
+      if (isScene) return {poses, alignment, storage | copiedTo};
       return {poses, alignment, read | copiedTo};
     case BufferRole::gpuPoses:
-      if (isScene) return {gpuPoses, alignment, storage};
+      if (isScene) return {gpuPoses, alignment, storage | copiedTo};
       break;
     case BufferRole::tables:
       if (isScene) return {tables, alignment, read | copiedTo | indirect};
@@ -111,9 +111,6 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
       return {outputs.tangents, alignment, written};
     case BufferRole::previousPositions:
       return {outputs.previousPositions, alignment, written};
-    case BufferRole::upload:
-      if (isScene) return {tables, 4, copiedFrom};
-      break;
     case BufferRole::readBack:
       if (isScene) return {readBackResults + resultBytes, 4, copiedTo};
       break;

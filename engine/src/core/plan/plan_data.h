@@ -34,6 +34,18 @@ struct PlanSizes {
                                 const DeviceLimits& limits) const;
 };
 
+/// The buffers that the commands of a plan name. Their sizes are at most storage buffer ranges, but
+/// for outputs.
+struct PlanBuffers {
+  std::array<BufferPart, bufferRoleCount> parts;  ///< by role; `noBuffer` if there is none
+  std::vector<BufferPart> poses;                  ///< of a scene: of both kinds, by their index
+
+  BufferPart& operator[](BufferRole role) { return parts[static_cast<std::size_t>(role)]; }
+  const BufferPart& operator[](BufferRole role) const {
+    return parts[static_cast<std::size_t>(role)];
+  }
+};
+
 /// Alignment of the scene's output in its buffer. It is a multiple of every size that kernels store
 /// at once: 8 bytes, and with wide stores also 12, 16, 24 and 32.
 inline std::uint32_t outputRangeAlignment(const DeviceLimits& limits) {
@@ -53,6 +65,7 @@ struct PlanData {
   void clear();
 
   std::vector<Command> commands;
+  std::vector<Binding> bindings;  ///< of all dispatches, one after the other
   std::vector<Variant> variants;
   /// Palette records, the numbers of results to clear, group records, instance records, extensions
   /// (each followed by its active morph targets). If the GPU culls: candidates, their dispatches,
@@ -65,7 +78,6 @@ struct PlanData {
   DeviceLimits limits;
   std::uint32_t instanceCount = 0;
   std::uint64_t vertexCount = 0;
-  std::uint32_t candidateCount = 0;  ///< instances that the GPU may choose
 
   std::unique_ptr<PlanMaker> maker;  ///< of `makePlan`, kept for its memory
 };

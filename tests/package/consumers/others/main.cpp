@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "abi.h"
+#include "dermis/cpu/scene_runner.h"
 #include "dermis/cpu/skin.h"
-#include "dermis/cpu/skinning_system.h"
 #include "dermis/gltf.h"
 #include "dermis/pack.h"
 #include "dermis/plan.h"
@@ -90,19 +90,19 @@ Result<bool> skinTriangle() {
   if (!isExpected()) return false;
 
   // The same in a scene.
-  cpu::SkinningSystemDescription description;
-  description.output = std::as_writable_bytes(std::span(skinnedFloats));
-  Result<cpu::SkinningSystem> scene = cpu::SkinningSystem::create(description);
+  SceneDescription description;
+  Result<cpu::SceneRunner> scene =
+      cpu::SceneRunner::create(description, std::as_writable_bytes(std::span(skinnedFloats)));
   if (!scene) return scene.error();
   InstanceDescription inScene;
-  inScene.mesh = *scene->addMesh(*packed);
-  inScene.pose = *scene->addPose(1);
-  const Result<InstanceHandle> added = scene->addInstance(inScene);
+  inScene.mesh = *scene->scene().addMesh(*packed);
+  inScene.pose = *scene->scene().addPose(1);
+  const Result<InstanceHandle> added = scene->scene().addInstance(inScene);
   if (!added) return added.error();
-  const Result<void> morphed = scene->change({.instance = *added, .morphs = {{&morph, 1}}});
+  const Result<void> morphed = scene->scene().change({.instance = *added, .morphs = {{&morph, 1}}});
   if (!morphed) return morphed.error();
-  scene->beginFrame();
-  scene->writePose(inScene.pose)->front() = palette.front();
+  if (const Result<void> begun = scene->scene().beginFrame(1, 0); !begun) return begun.error();
+  scene->scene().writePose(inScene.pose)->front() = palette.front();
   std::memset(skinnedFloats, 0, sizeof(skinnedFloats));
   for (const cpu::PlannedJob& planned : *scene->jobs()) cpu::skin(planned);
   return isExpected();

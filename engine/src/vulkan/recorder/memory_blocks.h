@@ -1,4 +1,4 @@
-// Allocates the buffers of a SkinningSystem from large blocks of memory, if the engine has no
+// Allocates the buffers of a SceneRecorder from large blocks of memory, if the engine has no
 // allocator.
 #pragma once
 
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dermis/vulkan/buffer_callbacks.h"
-#include "system/range_allocator.h"
-#include "vulkan/system/functions.h"
+#include "scene/range_allocator.h"
+#include "vulkan/recorder/functions.h"
 
 namespace dermis::vulkan {
 

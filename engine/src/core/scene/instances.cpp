@@ -4,7 +4,7 @@
 #include <string>
 
 #include "plan/check.h"
-#include "system/books.h"
+#include "scene/books.h"
 
 namespace dermis {
 namespace {
@@ -47,6 +47,10 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   if (pose == nullptr) return unknownHandle("pose", instance.poseHandle);
   if (updateInterval == 0)
     return invalid("the instance's update interval must be at least 1 frame, not 0");
+  if (owner_.isCpu && isForComparison(instance.method)) {
+    return invalid("the instance: " + std::string(methodName(instance.method)) +
+                   " is a method for comparison, which the CPU path does not support");
+  }
   const Result<VertexPlaces> laidOut = placeVertices(instance.layout, mesh->info.vertexCount);
   if (!laidOut) return laidOut.error();
   const std::uint64_t most = description_.outputCapacity.maximum;
@@ -68,8 +72,7 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   batch.outputs = OutputSizes::oneBuffer(std::max(outputStore_.ranges.capacity(), laidOut->size));
   const Job job = jobOf(instance, *mesh, *laidOut);
   const OutputStreams streams = outputStreams(job);
-  if (Result<void> good = checkJob(batch, job, streams, theInstance, description_.limits); !good)
-    return good;
+  if (Result<void> good = checkJob(batch, job, streams, theInstance, limits_); !good) return good;
   return checkRuns(job, streams, theInstance);
 }
 
@@ -143,14 +146,14 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   }
   Placing placing;
   placing.subject = theInstance;
-  placing.windows = {OutputSizes::oneBuffer(outputStore_.ranges.capacity()), description_.limits};
+  placing.windows = {OutputSizes::oneBuffer(outputStore_.ranges.capacity()), limits_};
   placing.jointCount = pose.jointCount;
   placing.mayScale = pose.mayScale;
   placing.isCulled = isCulled;
   runsScratch_.clear();
   const Job job = jobOf(instance, mesh, *laidOut);
-  if (Result<void> placed = groups_.place(job, outputStreams(job), placing, description_.limits,
-                                          description_.tuning, runsScratch_);
+  if (Result<void> placed =
+          groups_.place(job, outputStreams(job), placing, limits_, tuning_, runsScratch_);
       !placed)
     return placed;
   instance.run = runsScratch_.front();
@@ -204,70 +207,76 @@ void SceneBooks::unlink(std::uint32_t index) {
   --pose.users;
 }
 
-Result<InstanceHandle> SceneBooks::addInstance(const InstanceDescription& description) {
+Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description) {
+  SceneBooks& books = changed();
   SceneInstance instance;
   instance.pose = description.pose.index;
   instance.method = description.method;
   const bool isCulled = description.culledOnGpu;
+  if (books.owner_.isCpu && isCulled)
+    return invalid("an instance that is culled on the GPU cannot be skinned on the CPU");
   instance.mesh = description.mesh;
   instance.poseHandle = description.pose;
   instance.layout = description.layout;
   instance.vertexBytes = attributeBytes(description.layout);
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
-  if (Result<void> good = check(instance, description.updateInterval); !good) return good.error();
-  if (!hasSlot()) {
-    return Error{ErrorCode::limitExceeded, "there are " + std::to_string(slotCapacity_) +
+  if (Result<void> good = books.check(instance, description.updateInterval); !good)
+    return good.error();
+  if (!books.hasSlot()) {
+    return Error{ErrorCode::limitExceeded, "there are " + std::to_string(books.slotCapacity_) +
                                                " instances already: the maximum of "
                                                "instanceCapacity"};
   }
   instance.extras.hasBox = isSnormPosition(instance.layout.positions);
-  if (Result<void> taken = takeResult(instance); !taken) return taken.error();
-  if (Result<void> found = findRoom(instance, isCulled); !found) {
-    freeResult(instance);
+  if (Result<void> taken = books.takeResult(instance); !taken) return taken.error();
+  if (Result<void> found = books.findRoom(instance, isCulled); !found) {
+    books.freeResult(instance);
     return found.error();
   }
-  if (Result<void> reserved = reserveUnits(instance); !reserved) {
-    freeResult(instance);
-    releaseTarget(instance);
+  if (Result<void> reserved = books.reserveUnits(instance); !reserved) {
+    books.freeResult(instance);
+    books.releaseTarget(instance);
     return reserved.error();
   }
 
-  makeSlot();
-  ++meshes_.at(instance.mesh.index).users;
-  const InstanceHandle handle = instances_.add(std::move(instance));
-  if (handle.index >= states_.size()) states_.resize(handle.index + std::size_t{1});
-  InstanceState& state = states_[handle.index];
+  books.makeSlot();
+  ++books.meshes_.at(instance.mesh.index).users;
+  const InstanceHandle handle = books.instances_.add(std::move(instance));
+  if (handle.index >= books.states_.size()) books.states_.resize(handle.index + std::size_t{1});
+  InstanceState& state = books.states_[handle.index];
   state = {};
   state.generation = handle.generation;
   state.updateInterval = description.updateInterval;
   state.isCulled = isCulled;
   state.hasMotion = description.layout.motion != Motion::none;
-  link(handle.index);
+  books.link(handle.index);
   if (isCulled) {
-    instances_.at(handle.index).culledIndex = static_cast<std::uint32_t>(culled_.size());
-    culled_.push_back(handle.index);
+    books.instances_.at(handle.index).culledIndex =
+        static_cast<std::uint32_t>(books.culled_.size());
+    books.culled_.push_back(handle.index);
   }
-  shift(handle);
-  makeStale(handle.index);
+  books.shift(handle);
+  books.raise(handle.index, Need::restart);
   return handle;
 }
 
-Result<void> SceneBooks::removeInstance(InstanceHandle handle) {
-  SceneInstance* instance = instances_.find(handle);
+Result<void> Scene::removeInstance(InstanceHandle handle) {
+  SceneBooks& books = changed();
+  SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
-  unlink(handle.index);
-  --meshes_.at(instance->mesh.index).users;
-  releaseTarget(*instance);
-  if (instance->shown) retire(outputStore_.ranges, instance->shown->bytes);
-  freeResult(*instance);
-  if (states_[handle.index].isCulled) {
-    culled_[instance->culledIndex] = culled_.back();
-    instances_.at(culled_.back()).culledIndex = instance->culledIndex;
-    culled_.pop_back();
+  books.unlink(handle.index);
+  --books.meshes_.at(instance->mesh.index).users;
+  books.releaseTarget(*instance);
+  if (instance->shown) books.retire(books.outputStore_.ranges, instance->shown->bytes);
+  books.freeResult(*instance);
+  if (books.states_[handle.index].isCulled) {
+    books.culled_[instance->culledIndex] = books.culled_.back();
+    books.instances_.at(books.culled_.back()).culledIndex = instance->culledIndex;
+    books.culled_.pop_back();
   }
-  states_[handle.index] = {};
-  instances_.remove(handle);
+  books.states_[handle.index] = {};
+  books.instances_.remove(handle);
   return {};
 }
 
@@ -335,12 +344,10 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
   unlink(handle.index);
   release(instance);
   const bool hasNewBox = change.box && isSnormPosition(changed.layout.positions);
-  state.restartsMotion |= hasNewMesh || hasNewBox;
-  state.isUrgent = true;
   instance = std::move(changed);
   link(handle.index);
   if (hasNewMesh) shift(handle);
-  makeStale(handle.index);
+  raise(handle.index, hasNewMesh || hasNewBox ? Need::restart : Need::urgent);
   return {};
 }
 
@@ -350,9 +357,7 @@ Result<void> SceneBooks::setBox(InstanceHandle handle, const Box& box) {
                    ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }
   instances_.at(handle.index).extras.box = box;
-  states_[handle.index].isUrgent = true;
-  states_[handle.index].restartsMotion = true;
-  makeStale(handle.index);
+  raise(handle.index, Need::restart);
   return {};
 }
 
@@ -374,17 +379,18 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
       return good;
     }
   }
-  makeStale(handle.index);
+  raise(handle.index, Need::stale);
   return {};
 }
 
-/// Of one that was invisible.
-void SceneBooks::show(InstanceState& state, InstanceHandle handle) {
-  state.isVisible = true;
-  // Not displayed by the last record: what it showed before is no motion.
-  if (state.hiddenAfter != record_) state.visibleFrom = record_ + 1;
+void SceneBooks::setView(InstanceState& state, InstanceHandle handle, bool isVisible) {
+  const View view = after(state.view, isVisible ? ViewEvent::show : ViewEvent::hide);
+  if (view == state.view) return;
+  state.view = view;
+  if (view == View::leaving || view == View::returning) turning_.push_back(handle);
+  if (!isVisible) return;
   if (state.isMoving) moving_.push_back(handle);
-  if (state.isStale) makePending(state, handle.index);
+  if (state.need != Need::none) makePending(state, handle.index);
 }
 
 /// Changes that affect the kernel, the inputs or the output of the instance.
@@ -403,39 +409,31 @@ Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
 /// All other changes, which cannot fail.
 void SceneBooks::changeState(InstanceState& state, const InstanceChange& change) {
   if (change.updateInterval) state.updateInterval = *change.updateInterval;
-  if (change.visible && *change.visible != state.isVisible) {
-    if (*change.visible) {
-      show(state, change.instance);
-    } else {
-      hide(state);
-    }
-  }
-  if (change.teleports) {
-    state.restartsMotion = true;
-    state.isUrgent = true;
-    makeStale(change.instance.index);
-  }
+  if (change.visible) setView(state, change.instance, *change.visible);
+  if (change.teleports) raise(change.instance.index, Need::restart);
 }
 
-Result<void> SceneBooks::change(const InstanceChange& change) {
-  InstanceState* const state = findState(change.instance);
+Result<void> Scene::change(const InstanceChange& change) {
+  SceneBooks& books = changed();
+  InstanceState* const state = books.findState(change.instance);
   if (state == nullptr) return unknownHandle("instance", change.instance);
   if (change.updateInterval == 0u) {
     return invalid("instance " + std::to_string(change.instance.index) +
                    ": the update interval must be at least 1 frame, not 0");
   }
-  if (Result<void> done = changeSkinning(change); !done) return done;
-  changeState(*state, change);
+  if (Result<void> done = books.changeSkinning(change); !done) return done;
+  books.changeState(*state, change);
   return {};
 }
 
-Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
+Result<void> Scene::change(std::span<const InstanceChange> changes) {
+  SceneBooks& books = changed();
   for (const InstanceChange& one : changes) {
     const bool changesSkinning =
         one.mesh || one.pose || one.method || one.box || one.morphs || one.updateInterval == 0u;
-    InstanceState* const state = findState(one.instance);
+    InstanceState* const state = books.findState(one.instance);
     if (!changesSkinning && state != nullptr) {
-      changeState(*state, one);
+      books.changeState(*state, one);
     } else if (Result<void> done = change(one); !done) {
       return numbered(done.error(), &one - changes.data());
     }
@@ -443,10 +441,10 @@ Result<void> SceneBooks::change(std::span<const InstanceChange> changes) {
   return {};
 }
 
-Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> instances) {
-  // Local copies, so that the compiler knows that stores to a state do not change them.
-  const std::span<InstanceState> states = states_;
-  const std::uint64_t record = record_;
+Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances) {
+  SceneBooks& books = changed();
+  // A local copy, so that the compiler knows that stores to a state do not change it.
+  const std::span<InstanceState> states = books.states_;
   for (const InstanceVisibility& wanted : instances) {
     const InstanceHandle handle = wanted.instance;
     const bool isKnown = handle.index < states.size() && handle &&
@@ -459,31 +457,23 @@ Result<void> SceneBooks::setVisibility(std::span<const InstanceVisibility> insta
     }
     InstanceState& state = states[handle.index];
     state.updateInterval = wanted.updateInterval;
-    if (state.isVisible == wanted.visible) continue;
-    if (wanted.visible && (state.isStale || state.isMoving)) {
-      show(state, handle);
-      continue;
-    }
-    // `show` and `hide` without calls: no list gets longer.
-    state.isVisible = wanted.visible;
-    if (!wanted.visible) {
-      if (state.visibleFrom != record + 1) state.hiddenAfter = record;
-    } else if (state.hiddenAfter != record) {
-      state.visibleFrom = record + 1;
-    }
+    if (isDisplayed(state.view) != wanted.visible) books.setView(state, handle, wanted.visible);
   }
   return {};
 }
 
-Result<bool> SceneBooks::isDue(InstanceHandle handle) const {
-  const SceneInstance* instance = instances_.find(handle);
+Result<bool> Scene::isDue(InstanceHandle handle) const {
+  const SceneBooks& books = *books_;
+  const SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
-  const InstanceState& state = states_[handle.index];
-  return hasBegun_ && state.isVisible && isDue(state, instance->pose);
+  const InstanceState& state = books.states_[handle.index];
+  const Action action = books.actionOf(state, instance->pose, std::max(state.need, Need::stale));
+  return books.hasBegun_ && action >= Action::skin;
 }
 
-std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
-  RangeAllocator& ranges = outputStore_.ranges;
+std::uint64_t Scene::compact(std::uint64_t maxBytes) {
+  SceneBooks& books = changed();
+  RangeAllocator& ranges = books.outputStore_.ranges;
   const std::uint64_t most = std::min(maxBytes, ranges.largestFree());
   struct Movable {
     std::uint64_t offset, size;
@@ -491,9 +481,9 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
   };
   std::vector<Movable> movable;
   std::uint64_t smallest = ~std::uint64_t{0};
-  for (std::uint32_t index = 0; most != 0 && index < instances_.capacity(); ++index) {
-    if (!instances_.isUsed(index)) continue;
-    const SceneInstance& instance = instances_.at(index);
+  for (std::uint32_t index = 0; most != 0 && index < books.instances_.capacity(); ++index) {
+    if (!books.instances_.isUsed(index)) continue;
+    const SceneInstance& instance = books.instances_.at(index);
     const Range& bytes = instance.target.bytes;
     if (instance.shown != instance.target || bytes.size > most) continue;
     movable.push_back({bytes.offset, bytes.size, index});
@@ -509,7 +499,7 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
     const auto [offset, size, index] = movable.back();
     movable.pop_back();
     if (size >= tooLarge || size > maxBytes - moved) continue;
-    SceneInstance& instance = instances_.at(index);
+    SceneInstance& instance = books.instances_.at(index);
     const Range from = instance.target.bytes;
     const Result<VertexPlaces> laidOut = placeVertices(instance.layout, instance.vertexCount);
     const std::optional<Range> to = ranges.allocateBelow(size, laidOut->alignment, offset);
@@ -518,26 +508,27 @@ std::uint64_t SceneBooks::compact(std::uint64_t maxBytes) {
       continue;
     }
     instance.target.bytes = *to;
-    if (!remakeRuns(instance, states_[index].isCulled)) {
+    if (!books.remakeRuns(instance, books.states_[index].isCulled)) {
       // It would lie in two storage buffer ranges, and must not.
       ranges.free(*to);
       instance.target.bytes = from;
       continue;
     }
-    shift(instances_.handleOf(index));
+    books.shift(books.instances_.handleOf(index));
     moved += size;
   }
   ranges.endMoves();
   return moved;
 }
 
-Result<InstanceOutput> SceneBooks::output(InstanceHandle handle) const {
-  const SceneInstance* instance = instances_.find(handle);
+Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
+  const SceneBooks& books = *books_;
+  const SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   InstanceOutput output;
   if (!instance->shown) return output;
   const Place& place = *instance->shown;
-  const std::uint64_t offset = outputStore_.base + place.bytes.offset;
+  const std::uint64_t offset = books.outputStore_.base + place.bytes.offset;
   const Result<VertexPlaces> places = placeVertices(instance->layout, place.vertexCount, offset);
   if (!places) return places.error();
   output.mesh = place.mesh;

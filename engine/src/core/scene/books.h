@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -14,15 +15,59 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
+#include "dermis/scene_commands.h"
 #include "plan/encode.h"
 #include "plan/work.h"
-#include "system/range_allocator.h"
-#include "system/slot_map.h"
+#include "scene/range_allocator.h"
+#include "scene/slot_map.h"
+#include "scene/states.h"
 
 namespace dermis {
 
+/// What a scene is created for.
+struct SceneSetup {
+  SceneDescription scene;
+  DeviceLimits limits;
+  Tuning tuning;
+  std::uint64_t outputOffset = 0;  ///< bytes before the output in its buffer
+};
+
+/// What a scene asks of its owner, besides buffers.
+struct SceneOwner {
+  void* user = nullptr;  ///< passed to all functions
+  SceneMemory memory;
+  /// Whether frames are executed by the CPU: each is complete when the next begins, and there are
+  /// neither culling nor poses of the GPU, nor methods for comparison.
+  bool isCpu = false;
+  /// The frame was begun, and no result has been read yet. Optional.
+  void (*frameBegun)(void* user, std::uint64_t completedFrame) = nullptr;
+  void (*frameAbandoned)(void* user) = nullptr;  ///< optional
+  /// Takes the bytes of a mesh. If null, the plan uploads them.
+  Result<void> (*meshAdded)(void* user, std::uint64_t offset, const PackedMesh& mesh) = nullptr;
+  void (*meshRemoved)(void* user, std::uint64_t offset) = nullptr;  ///< optional
+};
+
+Result<void> checkSetup(const SceneSetup& setup);
+/// With capacities that are whole units.
+SceneSetup rounded(SceneSetup setup);
 /// The initial sizes of a scene's buffers; for poses, of the first buffer of each kind.
-PlanSizes sceneSizes(const SceneDescription& description);
+PlanSizes sceneSizes(const SceneSetup& setup);
+
+/// A buffer that the owner created.
+struct SceneBufferMemory {
+  std::uint32_t number = noBuffer;
+  std::uint64_t size = 0;
+  std::byte* mapped = nullptr;
+
+  bool exists() const { return number != noBuffer; }
+};
+
+/// A buffer that may be replaced by a larger one with the same contents.
+struct GrowingBuffer {
+  SceneBufferMemory now;     ///< that the next frame uses
+  SceneBufferMemory before;  ///< has the contents, until a frame copies them to `now`
+  SceneBufferMemory copied;  ///< what the last frame copied, as long as it may be abandoned
+};
 
 /// The free ranges of a buffer that may grow.
 struct Store {
@@ -30,6 +75,7 @@ struct Store {
   Capacity capacity;            ///< in units
   std::uint64_t unitBytes = 1;  ///< what the ranges count
   std::uint64_t base = 0;       ///< bytes before it in its buffer
+  GrowingBuffer buffer = {};
   RangeAllocator ranges{capacity.initial, base};
 };
 
@@ -76,16 +122,12 @@ struct Place {
 struct InstanceState {
   std::uint32_t generation = 0;  ///< of its handle; 0: there is none
   std::uint32_t updateInterval = 1;
-  bool isStale = false;   ///< something changed since it was skinned
+  View view = View::shown;
+  Need need = Need::restart;
   bool isListed = false;  ///< among the pending
-  bool isVisible = true;
   bool isCulled = false;
   bool hasMotion = false;
-  bool restartsMotion = true;     ///< when it is skinned next
-  bool isUrgent = true;           ///< skinned at once, regardless of its interval
-  bool isMoving = false;          ///< previous positions may differ, as of the last record
-  std::uint64_t visibleFrom = 0;  ///< the first record that displays it again
-  std::uint64_t hiddenAfter = 0;  ///< the last record that displayed it before it was hidden
+  bool isMoving = false;  ///< previous positions may differ, as of the last record
 };
 
 struct SceneInstance {
@@ -97,8 +139,7 @@ struct SceneInstance {
   std::uint32_t pose = 0;  ///< index
   std::uint32_t vertexCount = 0;
   std::uint32_t vertexBytes = 0;  ///< that are written for a vertex
-  std::uint64_t plannedIn = 0;    ///< the last plan that skins it …
-  std::uint64_t settledIn = 0;    ///< … and the last that settles it
+  std::uint64_t plannedIn = 0;    ///< the last plan that skins or settles it
   std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
   std::uint64_t firstFrame = 0;  ///< in which it was skinned
   PlacedRun run;                 ///< the first, and mostly the only one
@@ -118,68 +159,24 @@ struct SceneInstance {
   std::optional<Place> shown;  ///< where it was last recorded
 };
 
-class SceneBooks {
- public:
-  explicit SceneBooks(const SceneDescription& description);
+struct SceneBooks {
+  SceneBooks(const SceneSetup& setup, const SceneOwner& owner);
 
-  Result<MeshHandle> addMesh(const MeshInfo& info);
-  Result<void> removeMesh(MeshHandle mesh);
-  Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
-                        const PoseOptions& options);
-  Result<void> removePose(PoseHandle pose);
-  Result<InstanceHandle> addInstance(const InstanceDescription& description);
-  Result<void> removeInstance(InstanceHandle instance);
-
-  Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
-  Result<PosePlace> writePose(PoseHandle pose);
-  Result<void> markWritten(std::span<const PoseHandle> poses);
-  Result<void> markAllWritten();
-  Result<void> change(const InstanceChange& change);
-  Result<void> change(std::span<const InstanceChange> changes);
-  Result<void> setVisibility(std::span<const InstanceVisibility> instances);
-  Result<bool> isDue(InstanceHandle instance) const;
-  std::uint64_t compact(std::uint64_t maxBytes);
-
-  /// Collects all work. None of it counts as done before `commit`.
-  Result<void> gather();
-  /// `gather`, encoded as a plan.
-  Result<void> plan(Plan& out);
-  Result<void> commit();
-  Result<void> abandonFrame(std::uint64_t frame);
-  /// Called if something changes: the current plan can no longer be committed.
-  void unplan() { isPlanned_ = false; }
-  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
-
-  const SlotMap<SceneMesh, MeshHandle>& meshes() const { return meshes_; }
-  const SlotMap<ScenePose, PoseHandle>& poses() const { return poses_; }
-  const SlotMap<SceneInstance, InstanceHandle>& instances() const { return instances_; }
-  static PosePlace placeOf(const ScenePose& pose);
-  std::uint32_t poseBufferCount() const { return static_cast<std::uint32_t>(poseBuffers_.size()); }
-  PoseBuffer poseBuffer(std::uint32_t number) const;
-  PlanSizes sizes() const;
-  Result<InstanceOutput> output(InstanceHandle instance) const;
-  Result<std::optional<Box>> bounds(InstanceHandle instance) const;
-  const SceneDescription& description() const { return description_; }
-  SceneStatistics statistics() const;
-
-  /// Of the last `gather`.
-  const Work& work() const { return work_; }
-  std::span<const CopyCommand> moves() const { return moves_; }
-
-  std::span<const InstanceHandle> skinned() const { return skinned_; }
-  std::span<const InstanceHandle> settled() const { return settled_; }
-  std::span<const InstanceHandle> moved() const { return moved_; }
-
- private:
   struct Retired {
     std::uint64_t frame;
     RangeAllocator* store;
     Range range;
   };
+  struct RetiredBuffer {
+    std::uint64_t frame;
+    std::uint32_t number;
+  };
   /// A buffer of poses. Addresses must stay the same: `Retired` has them.
   struct PoseStore {
     PoseWriter writer;
     RangeAllocator joints;
+    SceneBufferMemory buffer;
+    std::vector<JointMatrix> staged;  ///< what the CPU writes where the buffer is not mapped
   };
 
   Result<void> check(const SceneInstance& instance, std::uint32_t updateInterval) const;
@@ -201,21 +198,16 @@ class SceneBooks {
   Result<void> setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs);
   Result<void> changeSkinning(const InstanceChange& change);
   void changeState(InstanceState& state, const InstanceChange& change);
-  void show(InstanceState& state, InstanceHandle handle);
-  void hide(InstanceState& state) const {
-    state.isVisible = false;
-    if (state.visibleFrom != record_ + 1) state.hiddenAfter = record_;
-  }
+  void setView(InstanceState& state, InstanceHandle handle, bool isVisible);
   void shift(InstanceHandle handle);
 
-  // scene.cpp
-  void makeStale(std::uint32_t index) {
+  void raise(std::uint32_t index, Need need) {
     InstanceState& state = states_[index];
-    state.isStale = true;
+    state.need = std::max(state.need, need);
     makePending(state, index);
   }
   void makePending(InstanceState& state, std::uint32_t index) {
-    if (state.isListed || !state.isVisible || state.isCulled) return;
+    if (state.isListed || !isDisplayed(state.view) || state.isCulled) return;
     state.isListed = true;
     pending_.push_back({index, state.generation});
   }
@@ -225,67 +217,119 @@ class SceneBooks {
     InstanceState& state = states_[handle.index];
     return state.generation == handle.generation ? &state : nullptr;
   }
-  void retire(RangeAllocator& store, const Range& range);
+
+  // meshes_and_poses.cpp
+  /// Keeps the bytes, or the owner does; null if the owner has them already.
+  Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
   Result<void> checkWrite(PoseHandle handle, PoseWriter writer) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
-  void freeRetired();
+  /// Where the matrices of the current slot are in the buffer of the pose.
+  std::uint64_t offsetOf(const ScenePose& pose) const {
+    return (pose.joints.offset + std::uint64_t{pose.slot} * pose.jointCount) * sizeof(JointMatrix);
+  }
+  /// Fails for a pose that the CPU writes.
+  Result<BufferPart> posePart(PoseHandle pose) const;
+  /// The memory that the CPU writes.
+  std::span<JointMatrix> matricesOf(const ScenePose& pose);
+  void upload(PoseHandle pose) {
+    if (poseBuffers_[poses_.at(pose.index).buffer].buffer.mapped == nullptr)
+      poseUploads_.push_back(pose);
+  }
 
   // stores.cpp
+  Result<void> createFirstBuffers();
+  Result<SceneBufferMemory> create(BufferRole role, const BufferRequirement& needed);
+  Result<void> addPoseBuffer(PoseWriter writer, std::uint64_t joints);
+  void replace(GrowingBuffer& buffer, const SceneBufferMemory& larger);
+  std::array<GrowingBuffer*, 4> keptBuffers() {
+    return {&meshStore_.buffer, &outputStore_.buffer, &resultStore_.buffer, &history_};
+  }
+  void retire(RangeAllocator& store, const Range& range);
+  void retire(const SceneBufferMemory& buffer);
+  void freeRetired();
+  PlanSizes sizes() const;
   static Error noRoom(const std::string& what, const Store& store, const char* unit);
   Result<std::optional<Range>> take(Store& store, std::uint64_t size, std::uint64_t alignment);
   Result<void> grow(Store& store, std::uint64_t least);
-  Result<void> growBuffer(BufferRole role, const PlanSizes& sizes, std::uint32_t poseBuffer = 0);
   Result<std::optional<Range>> takeJoints(std::uint64_t count, PoseWriter writer,
                                           std::uint32_t& buffer);
   Error noJoints(std::size_t poses, std::uint64_t count, PoseWriter writer) const;
   /// In joints.
   std::uint64_t largestPoseBuffer(PoseWriter writer) const {
-    return description_.limits.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writer);
+    return limits_.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writer);
   }
   std::uint32_t slotsOf(PoseWriter writer) const {
     return writer == PoseWriter::cpu ? description_.framesInFlight : 1;
   }
   bool hasSlot() const;
   void makeSlot();
+  Result<void> makeFrameBuffers(const PlanData& plan);
+  void nameBuffers();
 
-  // gather.cpp
+  // frame.cpp
+  /// Collects all work (`work_`). None of it counts as done before `commit`.
+  Result<void> gather();
+  /// `gather`, encoded as a plan.
+  Result<void> plan(Plan& out);
+  Result<void> commit();
+  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
+  void begin(std::uint64_t frame, std::uint64_t completedFrame);
+  void readBackComplete();
+  void listGrowth();
+  void listUploads();
+  void abandon();
   void gatherPoses();
   void gatherPending();
   void gatherSettling();
   void gatherCulled();
   void gatherMoves();
   void gatherResults();
-  void addDue(std::uint32_t index);
+  void addDue(std::uint32_t index, bool restarts);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
-  bool isDue(const InstanceState& state, std::uint32_t pose) const;
-  /// Whether its previous positions become its current ones, if that record skins it.
-  static bool restarts(const InstanceState& state, std::uint64_t record) {
-    return state.restartsMotion || state.visibleFrom == record;
+  bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
+  /// What the next frame does with it, if `need` is what is out of date.
+  Action actionOf(const InstanceState& state, std::uint32_t pose, Need need) const {
+    return actionFor(state.view, need,
+                     state.updateInterval == 1 || isOnBeat(state.updateInterval, pose));
   }
   void convertPalette(const SceneInstance& instance);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
   void commitInstance(std::uint32_t index);
-  void keepForAbandoning();
-  void abandonInstances();
-  void abandonShifts();
 
+  SceneOwner owner_;
   SceneDescription description_;
+  DeviceLimits limits_;
+  Tuning tuning_;
+  std::uint32_t nextBuffer_ = visibilityBuffer + 1;  ///< number
   SlotMap<SceneMesh, MeshHandle> meshes_;
   SlotMap<ScenePose, PoseHandle> poses_;
   SlotMap<SceneInstance, InstanceHandle> instances_;
   std::vector<InstanceState> states_;  ///< of each instance, by index
   Store meshStore_, unitStore_, outputStore_, resultStore_;
+  GrowingBuffer history_;
+  SceneBufferMemory tables_, counters_;
+  std::uint32_t output_ = noBuffer;  ///< the buffer of the last frame
   std::deque<PoseStore> poseBuffers_;
   std::uint64_t slotCapacity_ = 0;  ///< of instances
   Groups groups_;
   Work work_;
   Encoder encoder_;
   std::deque<Retired> retired_;
+  std::deque<RetiredBuffer> retiredBuffers_;
+  struct MeshUpload {
+    MeshHandle mesh;
+    PackedMesh bytes;
+  };
+  std::vector<MeshUpload> meshUploads_;     ///< of the next frame …
+  std::vector<MeshUpload> uploadedMeshes_;  ///< … and of the last, as long as it may be abandoned
+  std::vector<PoseHandle> poseUploads_, uploadedPoses_;  ///< the same
 
   std::uint64_t frame_ = 0, completed_ = 0;
   std::uint64_t record_ = 0;         ///< the last that was committed
-  std::uint64_t recordedFrame_ = 0;  ///< its frame
+  std::uint64_t recordedFrame_ = 0;  ///< its frame …
+  std::uint64_t earlierFrame_ = 0;   ///< … and that of the record before it
+  bool mayAbandon_ = false;          ///< the last record
   bool hasBegun_ = false;
   std::uint32_t nextVersion_ = 0;
   std::vector<PlacedRun> runsScratch_;
@@ -295,13 +339,18 @@ class SceneBooks {
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;  ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;     ///< all that are culled on the GPU
-  std::vector<InstanceHandle> moving_;    ///< to settle if they are in view and not skinned; some
-                                          ///< more than once
+  std::vector<InstanceHandle> turning_;  ///< leaving or returning; some more than once or no longer
+  std::vector<InstanceHandle> moving_;   ///< to settle if they are in view and not skinned; some
+                                         ///< more than once
 
   // Of the plan.
   bool isPlanned_ = false;
   std::uint64_t planNumber_ = 0;
-  std::vector<std::uint32_t> due_;
+  struct Due {
+    std::uint32_t index;
+    bool restarts;
+  };
+  std::vector<Due> due_;  ///< to skin
   std::vector<std::uint32_t> settling_;
   struct Versioned {
     std::uint32_t index, version;
@@ -315,53 +364,37 @@ class SceneBooks {
   std::vector<CopyCommand> moves_;
   std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
   std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them
-  std::vector<CopyCommand> resultCopies_;
+  std::vector<CopyCommand> resultCopies_, growth_;
+  std::vector<UploadCommand> uploads_;
+  PlanBuffers buffers_;  ///< that it names
   std::vector<InstanceHandle> skinned_, settled_, moved_;
-  FrameWorkStatistics planned_, committed_;
+  FrameStatistics planned_, committed_;
 
   /// The results that a frame reads back.
   struct ReadBack {
     std::uint64_t frame = 0;
     bool hasCounters = false;
     std::vector<CopyCommand> results;
-
-    void swap(ReadBack& other) {
-      std::swap(frame, other.frame);
-      std::swap(hasCounters, other.hasCounters);
-      results.swap(other.results);
-    }
+    SceneBufferMemory buffer;
   };
 
-  /// The state before the last `commit`, so that `abandonFrame` can restore it. `conversions_` and
-  /// `settled_` last until the next plan and are not repeated here.
-  struct Abandonable {
-    struct Instance {
-      InstanceHandle handle;
-      bool restartsMotion, isUrgent, isMoving, isFirst;
-      std::uint32_t version;
-    };
-    struct Shift {
-      InstanceHandle handle;
-      std::optional<Place> shown;
-    };
-    bool isPossible = false;
-    std::uint64_t recordedFrame = 0;
-    std::uint32_t clearHistory = 0;
-    std::vector<Instance> instances;
-    std::vector<Shift> shifts;
-    ReadBack readBack;
-  } abandonable_;
-
-  std::uint32_t clearHistory_ = 0;   ///< records of the history that are clear, or in use
+  std::uint32_t clearHistory_ = 0;  ///< records of the history that are clear, or in use
+  ReadBack& readBackOf(std::uint64_t record) {
+    return readBacks_[static_cast<std::size_t>(record % readBacks_.size())];
+  }
+  ReadBack& nextReadBack() { return readBackOf(record_ + 1); }
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
   CullingStatistics culling_;
   std::vector<InstanceResult> latestResults_;  ///< by number, as they were last read back …
   std::vector<std::uint64_t> resultFrames_;    ///< … in these frames
 };
 
-/// How an executor of this repository reaches the books of a scene.
+/// How owners reach their scene.
 struct SceneAccess {
+  static Result<std::unique_ptr<Scene>> create(const SceneSetup& setup, const SceneOwner& owner);
   static SceneBooks& books(Scene& scene) { return *scene.books_; }
+  /// After which the current plan can no longer be committed.
+  static SceneBooks& changed(Scene& scene) { return scene.changed(); }
 };
 
 }  // namespace dermis

@@ -1,4 +1,4 @@
-#include "system/range_allocator.h"
+#include "scene/range_allocator.h"
 
 #include <algorithm>
 #include <iterator>

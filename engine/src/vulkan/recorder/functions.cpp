@@ -1,4 +1,4 @@
-#include "vulkan/system/functions.h"
+#include "vulkan/recorder/functions.h"
 
 #include <string>
 

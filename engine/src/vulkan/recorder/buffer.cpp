@@ -1,11 +1,11 @@
-#include "vulkan/system/buffer.h"
+#include "vulkan/recorder/buffer.h"
 
 #include <string>
 #include <utility>
 
 namespace dermis::vulkan {
 
-Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Description& description) {
+Result<OwnBuffer> OwnBuffer::create(BufferSource& source, const Description& description) {
   VkBufferCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
   info.size = description.size;
@@ -17,7 +17,7 @@ Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Descriptio
   request.name = description.name;
   const Result<CreatedBuffer> created = source.callbacks.create(source.callbacks.user, request);
   if (!created) return created.error();
-  SystemBuffer buffer;
+  OwnBuffer buffer;
   buffer.source_ = &source;
   buffer.created_ = *created;
   buffer.size_ = description.size;
@@ -34,16 +34,16 @@ Result<SystemBuffer> SystemBuffer::create(BufferSource& source, const Descriptio
   return buffer;
 }
 
-SystemBuffer::~SystemBuffer() {
+OwnBuffer::~OwnBuffer() {
   release();
 }
 
-SystemBuffer::SystemBuffer(SystemBuffer&& other) noexcept
+OwnBuffer::OwnBuffer(OwnBuffer&& other) noexcept
     : source_(std::exchange(other.source_, nullptr)),
       created_(std::exchange(other.created_, {})),
       size_(std::exchange(other.size_, 0)) {}
 
-SystemBuffer& SystemBuffer::operator=(SystemBuffer&& other) noexcept {
+OwnBuffer& OwnBuffer::operator=(OwnBuffer&& other) noexcept {
   if (this == &other) return *this;
   release();
   source_ = std::exchange(other.source_, nullptr);
@@ -52,7 +52,7 @@ SystemBuffer& SystemBuffer::operator=(SystemBuffer&& other) noexcept {
   return *this;
 }
 
-void SystemBuffer::release() {
+void OwnBuffer::release() {
   if (source_ == nullptr) return;
   if (created_.buffer != VK_NULL_HANDLE)
     source_->callbacks.destroy(source_->callbacks.user, created_);

@@ -1,4 +1,4 @@
-// The entry points that a SkinningSystem needs besides those of a Context.
+// The entry points that a SceneRecorder needs besides those of a Context.
 #pragma once
 
 #include <vulkan/vulkan_core.h>

@@ -1,4 +1,4 @@
-#include "vulkan/system/memory_blocks.h"
+#include "vulkan/recorder/memory_blocks.h"
 
 #include <algorithm>
 #include <string>

@@ -1,4 +1,4 @@
-#include "vulkan/system/timestamps.h"
+#include "vulkan/recorder/timestamps.h"
 
 #include <array>
 

@@ -1,11 +1,14 @@
-// Collects the work of a frame, and updates the state when the frame is committed or abandoned.
+// Frames: begins them, collects their work, and updates the state when they are committed or
+// abandoned.
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <string>
+#include <utility>
 
-#include "system/books.h"
+#include "scene/books.h"
 
 namespace dermis {
 namespace {
@@ -24,11 +27,9 @@ std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion, bool re
 /// All instances of a pose with the same interval are due in the same frames, even if the engine
 /// skips frame numbers: they are due if a multiple of the interval lies between the last record and
 /// this one.
-bool SceneBooks::isDue(const InstanceState& state, std::uint32_t pose) const {
-  const bool cameBack = state.visibleFrom == record_ + 1;
-  if (state.isUrgent || cameBack || state.updateInterval == 1) return true;
+bool SceneBooks::isOnBeat(std::uint32_t interval, std::uint32_t pose) const {
   const std::uint64_t beat = pose;
-  return (frame_ + beat) / state.updateInterval != (recordedFrame_ + beat) / state.updateInterval;
+  return (frame_ + beat) / interval != (recordedFrame_ + beat) / interval;
 }
 
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
@@ -45,7 +46,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   converted.plannedIn = planNumber_;
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
   const bool isCpu = pose.writer == PoseWriter::cpu;
-  const PoseSource source{static_cast<std::uint32_t>(placeOf(pose).offset / unitBytes), pose.buffer,
+  const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                           isCpu ? BufferRole::poses : BufferRole::gpuPoses};
   work_.addPose(source, converted.unit, pose.jointCount, form, pose.mayScale);
 }
@@ -72,19 +73,17 @@ void SceneBooks::gatherPoses() {
     if (pose == nullptr) continue;
     for (std::uint32_t index = pose->firstInstance; index != notUsed;
          index = instances_.at(index).nextOfPose)
-      makeStale(index);
+      raise(index, Need::stale);
   }
   posed_.clear();
 }
 
-void SceneBooks::addDue(std::uint32_t index) {
+void SceneBooks::addDue(std::uint32_t index, bool restarts) {
   SceneInstance& instance = instances_.at(index);
   instance.plannedIn = planNumber_;
-  due_.push_back(index);
+  due_.push_back({index, restarts});
   convertPalette(instance);
-  const InstanceState& state = states_[index];
-  addRuns(instance, state.hasMotion && restarts(state, record_ + 1) ? abi::INSTANCE_RESTARTS : 0u,
-          nullptr);
+  addRuns(instance, states_[index].hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
   if (instance.extras.result != notUsed) {
     work_.clearedResults.push_back(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
@@ -100,11 +99,12 @@ void SceneBooks::gatherPending() {
     const InstanceHandle handle = pending_[entry];
     InstanceState* const state = findState(handle);
     if (state == nullptr) continue;
-    if (!state->isStale || !state->isVisible) {
+    if (state->need == Need::none || !isDisplayed(state->view)) {
       state->isListed = false;
       continue;
     }
-    if (isDue(*state, instances_.at(handle.index).pose)) addDue(handle.index);
+    const Action action = actionOf(*state, instances_.at(handle.index).pose, state->need);
+    if (action >= Action::skin) addDue(handle.index, action == Action::restart);
     pending_[kept++] = handle;
   }
   pending_.resize(kept);
@@ -117,9 +117,9 @@ void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
     SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr || instance->plannedIn == planNumber_ ||
-        instance->settledIn == planNumber_ || !states_[handle.index].isVisible)
+        !isDisplayed(states_[handle.index].view))
       continue;
-    instance->settledIn = planNumber_;
+    instance->plannedIn = planNumber_;
     settling_.push_back(handle.index);
     addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
@@ -130,9 +130,9 @@ void SceneBooks::gatherCulled() {
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
     const InstanceState& state = states_[index];
-    if (!state.isVisible) continue;
+    if (!isDisplayed(state.view)) continue;
     std::uint32_t version = instance.version;
-    const bool isNew = version == 0 || (state.isStale && isDue(state, instance.pose));
+    const bool isNew = version == 0 || actionOf(state, instance.pose, state.need) >= Action::skin;
     if (isNew) {
       version = ++nextVersion_;
       versioned_.push_back({index, version});
@@ -146,7 +146,7 @@ void SceneBooks::gatherCulled() {
     convertPalette(instance);
     const Candidate candidate{index, version};
     // One that the GPU has yet to show in this version comes back, and restarts for that.
-    const bool restarts = isNew && state.restartsMotion;
+    const bool restarts = isNew && state.need == Need::restart;
     addRuns(instance, culledFlags(instance, state.hasMotion, restarts), &candidate);
   }
 }
@@ -157,8 +157,9 @@ void SceneBooks::gatherMoves() {
     if (instance == nullptr || !instance->shown || instance->shown->mesh != instance->target.mesh ||
         instance->shown == instance->target)
       continue;
-    moves_.push_back({BufferRole::positions, BufferRole::positions, instance->shown->bytes.offset,
-                      instance->target.bytes.offset, instance->target.bytes.size});
+    const std::uint32_t output = outputStore_.buffer.now.number;
+    moves_.push_back({output, output, instance->shown->bytes.offset, instance->target.bytes.offset,
+                      instance->target.bytes.size});
     planned_.movedBytes += instance->target.bytes.size;
   }
 }
@@ -182,7 +183,7 @@ void SceneBooks::gatherResults() {
     const std::uint64_t end =
         (last + 1) * bits - static_cast<std::uint64_t>(std::countl_zero(marks[last]));
     resultCopies_.push_back(
-        {BufferRole::results, BufferRole::readBack, first * sizeof(InstanceResult),
+        {resultStore_.buffer.now.number, noBuffer, first * sizeof(InstanceResult),
          readBackResults + first * sizeof(InstanceResult), (end - first) * sizeof(InstanceResult)});
     begin = last;
   }
@@ -224,19 +225,47 @@ Result<void> SceneBooks::gather() {
   return {};
 }
 
+void SceneBooks::listGrowth() {
+  growth_.clear();
+  for (const GrowingBuffer* buffer : keptBuffers()) {
+    if (!buffer->before.exists()) continue;
+    growth_.push_back({buffer->before.number, buffer->now.number, 0, 0, buffer->before.size});
+  }
+}
+
+void SceneBooks::listUploads() {
+  uploads_.clear();
+  for (const MeshUpload& upload : meshUploads_) {
+    const Range& bytes = meshes_.at(upload.mesh.index).bytes;
+    uploads_.push_back(
+        {{meshStore_.buffer.now.number, bytes.offset, bytes.size}, upload.bytes.bytes()});
+  }
+  for (const PoseHandle handle : poseUploads_) {
+    const ScenePose* pose = poses_.find(handle);
+    if (pose == nullptr) continue;
+    const std::span<const std::byte> bytes = std::as_bytes(matricesOf(*pose));
+    uploads_.push_back(
+        {{poseBuffers_[pose->buffer].buffer.number, offsetOf(*pose), bytes.size()}, bytes});
+  }
+}
+
 Result<void> SceneBooks::plan(Plan& out) {
   if (Result<void> gathered = gather(); !gathered) return gathered;
+  isPlanned_ = false;
   PlanData& data = PlanData::of(out);
   const auto record = static_cast<std::uint32_t>(record_ + 1);
-  const FrameWork frame{record, clearHistory_, moves_, resultCopies_};
-  if (Result<void> good =
-          encoder_.encode(work_, description_.limits, description_.tuning, sizes(), data, &frame);
-      !good) {
-    isPlanned_ = false;
+  Result<void> good = encoder_.encode(work_, limits_, tuning_, sizes(), data, record);
+  if (good) good = makeFrameBuffers(data);
+  if (!good) {
     data.clear();
     return good;
   }
-  data.vertexCount = planned_.skinnedVertices;
+  for (CopyCommand& copy : resultCopies_) copy.to = nextReadBack().buffer.number;
+  listGrowth();
+  listUploads();
+  nameBuffers();
+  encoder_.listFrame(buffers_, {clearHistory_, growth_, uploads_, moves_, resultCopies_});
+  isPlanned_ = true;
   return {};
 }
 
@@ -245,7 +274,6 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
   const bool isCulled = states_[handle.index].isCulled;
   if (!isMove && !isCulled && instance.plannedIn != planNumber_) return false;
-  abandonable_.shifts.push_back({handle, instance.shown});
   if (instance.shown && instance.shown != instance.target) {
     retire(outputStore_.ranges, instance.shown->bytes);
     moved_.push_back(handle);
@@ -255,43 +283,35 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   return true;
 }
 
-void SceneBooks::keepForAbandoning() {
-  abandonable_.isPossible = true;
-  abandonable_.recordedFrame = recordedFrame_;
-  abandonable_.clearHistory = clearHistory_;
-  abandonable_.instances.clear();
-  abandonable_.shifts.clear();
-}
-
 /// Marks the instance as up to date.
 void SceneBooks::commitInstance(std::uint32_t index) {
   InstanceState& state = states_[index];
   SceneInstance& instance = instances_.at(index);
-  abandonable_.instances.push_back({{index, state.generation},
-                                    state.restartsMotion,
-                                    state.isUrgent,
-                                    state.isMoving,
-                                    instance.firstFrame == 0,
-                                    instance.version});
-  state.isStale = state.isUrgent = state.restartsMotion = false;
+  state.need = Need::none;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
 }
 
 Result<void> SceneBooks::commit() {
   if (!isPlanned_) return invalid("there is no plan to commit, or the scene has changed since");
-  keepForAbandoning();
   isPlanned_ = false;
+  mayAbandon_ = true;
   ++record_;
-  recordedFrame_ = frame_;
+  earlierFrame_ = std::exchange(recordedFrame_, frame_);
   hasBegun_ = false;
   committed_ = planned_;
   const bool culls = planned_.culledCandidates != 0;
   if (culls) clearHistory_ = static_cast<std::uint32_t>(slotCapacity_);
-  ReadBack& readBack = readBacks_[static_cast<std::size_t>(record_ % readBacks_.size())];
-  readBack.swap(abandonable_.readBack);
+  ReadBack& readBack = readBackOf(record_);
   readBack.frame = frame_;
   readBack.hasCounters = culls;
   readBack.results.swap(resultCopies_);
+  for (GrowingBuffer* buffer : keptBuffers())
+    buffer->copied = std::exchange(buffer->before, SceneBufferMemory());
+  output_ = outputStore_.buffer.now.number;
+  uploadedMeshes_.swap(meshUploads_);
+  meshUploads_.clear();
+  uploadedPoses_.swap(poseUploads_);
+  poseUploads_.clear();
   skinned_.clear();
   settled_.clear();
   moved_.clear();
@@ -300,18 +320,23 @@ Result<void> SceneBooks::commit() {
     ScenePose& pose = poses_.at(conversion.pose.index);
     pose.forms[conversion.form].version = pose.version;
   }
-  for (const std::uint32_t index : due_) {
+  for (const auto& [index, restarts] : due_) {
     InstanceState& state = states_[index];
     const InstanceHandle handle{index, state.generation};
-    // The same as when it was planned: nothing changed since.
-    const bool moves = state.hasMotion && !restarts(state, record_);
+    const bool moves = state.hasMotion && !restarts;
     commitInstance(index);
     state.isListed = false;
     state.isMoving = moves;
     if (moves) moving_.push_back(handle);
     skinned_.push_back(handle);
   }
-  std::erase_if(pending_, [this](InstanceHandle handle) { return !states_[handle.index].isStale; });
+  std::erase_if(pending_,
+                [this](InstanceHandle handle) { return states_[handle.index].need == Need::none; });
+  for (const InstanceHandle handle : turning_) {
+    if (InstanceState* const state = findState(handle))
+      state->view = after(state->view, ViewEvent::execute);
+  }
+  turning_.clear();
   for (const std::uint32_t index : settling_) {
     states_[index].isMoving = false;
     settled_.push_back(instances_.handleOf(index));
@@ -327,80 +352,117 @@ Result<void> SceneBooks::commit() {
   return {};
 }
 
-/// They are skinned again, as they would have been without the frame.
-void SceneBooks::abandonInstances() {
-  for (const Abandonable::Instance& before : abandonable_.instances) {
-    InstanceState* const state = findState(before.handle);
-    if (state == nullptr) continue;
-    state->restartsMotion |= before.restartsMotion;
-    state->isUrgent |= before.isUrgent;
-    state->isMoving = before.isMoving;
-    SceneInstance& instance = instances_.at(before.handle.index);
-    if (before.isFirst) instance.firstFrame = 0;
-    instance.version = before.version;
-    makeStale(before.handle.index);
+/// Nothing that the frame wrote exists, and what frames before it wrote is not looked for:
+/// everything is made again.
+Result<void> Scene::abandonFrame(std::uint64_t frame) {
+  SceneBooks& books = *books_;
+  if (!books.mayAbandon_ || frame != books.frame_) {
+    return invalid("frame " + std::to_string(frame) +
+                   " cannot be abandoned: it is not the frame that was executed last, or another "
+                   "has begun since");
   }
-  for (const InstanceHandle handle : settled_) {
-    if (InstanceState* const state = findState(handle)) state->isMoving = true;
-  }
+  books.abandon();
+  return {};
+}
+
+void SceneBooks::abandon() {
+  isPlanned_ = mayAbandon_ = false;
+  readBackOf(record_).frame = 0;
+  --record_;
+  recordedFrame_ = earlierFrame_;
+  hasBegun_ = true;
   moving_.clear();
   for (std::uint32_t index = 0; index < states_.size(); ++index) {
     InstanceState& state = states_[index];
     if (state.generation == 0) continue;
-    // These count records, and the abandoned record does not count.
-    if (state.visibleFrom == record_ + 1)
-      state.visibleFrom = state.hiddenAfter + 1 == record_ ? 0 : record_;
-    if (state.hiddenAfter == record_)
-      state.hiddenAfter = state.visibleFrom == record_ ? 0 : record_ - 1;
-    if (state.isMoving) moving_.push_back({index, state.generation});
+    state.isMoving = false;
+    state.view = isDisplayed(state.view) ? View::shown : View::hidden;
+    instances_.at(index).firstFrame = 0;
+    instances_.at(index).version = 0;
+    raise(index, Need::restart);
   }
-}
-
-/// The output of the frame before is displayed again. `commit` retired its place, and no other
-/// instance can have taken it: places are reused after `beginFrame` only.
-void SceneBooks::abandonShifts() {
-  std::vector<std::uint64_t> shownAgain;  // offsets of places
-  for (const Abandonable::Shift& shifted : abandonable_.shifts) {
-    SceneInstance* instance = instances_.find(shifted.handle);
-    if (instance == nullptr) continue;
-    const Place abandoned = *instance->shown;
-    instance->shown = shifted.shown;
-    if (shifted.shown && shifted.shown != abandoned)
-      shownAgain.push_back(shifted.shown->bytes.offset);
-    if (instance->target != abandoned) retire(outputStore_.ranges, abandoned.bytes);
-    if (instance->shown != instance->target) shift(shifted.handle);
+  turning_.clear();
+  for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
+    for (ScenePose::Form& form : poses_.at(index).forms) form.version = 0;
   }
-  // Retired places do not overlap, so the offset tells which one it is.
-  std::ranges::sort(shownAgain);
-  std::erase_if(retired_, [&](const Retired& retired) {
-    return retired.store == &outputStore_.ranges &&
-           std::ranges::binary_search(shownAgain, retired.range.offset);
-  });
-}
-
-Result<void> SceneBooks::abandonFrame(std::uint64_t frame) {
-  if (!abandonable_.isPossible || frame != frame_) {
-    return invalid("frame " + std::to_string(frame) +
-                   " cannot be abandoned: it is not the frame that was committed last, or another "
-                   "has begun since");
+  clearHistory_ = 0;
+  for (GrowingBuffer* buffer : keptBuffers()) {
+    if (!buffer->copied.exists()) continue;
+    // It was to get the contents, and has been replaced in its turn.
+    if (buffer->before.exists()) owner_.memory.release(owner_.memory.user, buffer->before.number);
+    buffer->before = std::exchange(buffer->copied, SceneBufferMemory());
   }
-  abandonable_.isPossible = false;
-  abandonInstances();
-  abandonShifts();
-  for (const Conversion& conversion : conversions_) {
-    if (ScenePose* pose = poses_.find(conversion.pose)) pose->forms[conversion.form].version = 0;
-  }
-  readBacks_[static_cast<std::size_t>(record_ % readBacks_.size())].swap(abandonable_.readBack);
-  clearHistory_ = abandonable_.clearHistory;
-  recordedFrame_ = abandonable_.recordedFrame;
-  --record_;
-  hasBegun_ = true;
-  isPlanned_ = false;
+  if (outputStore_.buffer.before.exists()) output_ = outputStore_.buffer.before.number;
+  std::erase_if(uploadedMeshes_,
+                [this](const MeshUpload& upload) { return meshes_.find(upload.mesh) == nullptr; });
+  std::ranges::move(uploadedMeshes_, std::back_inserter(meshUploads_));
+  uploadedMeshes_.clear();
+  poseUploads_.insert(poseUploads_.end(), uploadedPoses_.begin(), uploadedPoses_.end());
+  uploadedPoses_.clear();
   skinned_.clear();
   settled_.clear();
   moved_.clear();
   committed_ = {};
+  if (owner_.frameAbandoned != nullptr) owner_.frameAbandoned(owner_.user);
+}
+
+Result<void> Scene::beginFrame(std::uint64_t frame, std::uint64_t completedFrame) {
+  SceneBooks& books = changed();
+  if (books.owner_.isCpu && frame != 0) completedFrame = frame - 1;
+  if (frame <= books.frame_ || completedFrame < books.completed_ || completedFrame >= frame) {
+    return Error{ErrorCode::invalidArgument,
+                 "beginFrame(" + std::to_string(frame) + ", " + std::to_string(completedFrame) +
+                     "): the frame must be larger than " + std::to_string(books.frame_) +
+                     ", and the completed frame at least " + std::to_string(books.completed_) +
+                     " and less than the frame"};
+  }
+  if (std::ranges::all_of(books.readBacks_, [&](const SceneBooks::ReadBack& recorded) {
+        return recorded.frame > completedFrame;
+      })) {
+    return Error{ErrorCode::invalidArgument,
+                 "frame " + std::to_string(frame) + " begins while the GPU has completed frame " +
+                     std::to_string(completedFrame) +
+                     ": more frames are in flight than framesInFlight, which is " +
+                     std::to_string(books.description_.framesInFlight) +
+                     "; if one of them was recorded and not submitted, call abandonFrame"};
+  }
+  books.begin(frame, completedFrame);
   return {};
+}
+
+void SceneBooks::begin(std::uint64_t frame, std::uint64_t completedFrame) {
+  // The last frame can no longer be abandoned.
+  mayAbandon_ = false;
+  uploadedMeshes_.clear();
+  uploadedPoses_.clear();
+  for (GrowingBuffer* buffer : keptBuffers())
+    retire(std::exchange(buffer->copied, SceneBufferMemory()));
+  frame_ = frame;
+  completed_ = completedFrame;
+  hasBegun_ = true;
+  if (owner_.frameBegun != nullptr) owner_.frameBegun(owner_.user, completedFrame);
+  readBackComplete();
+  freeRetired();
+}
+
+/// Reads the results of complete frames, the oldest first, where they are mapped.
+void SceneBooks::readBackComplete() {
+  const auto next = [this] {
+    const ReadBack* oldest = nullptr;
+    for (const ReadBack& recorded : readBacks_) {
+      const bool isNew = recorded.frame > culling_.frame && recorded.frame <= completed_;
+      if (isNew && (oldest == nullptr || recorded.frame < oldest->frame)) oldest = &recorded;
+    }
+    return oldest;
+  };
+  while (const ReadBack* recorded = next()) {
+    const bool copied = recorded->hasCounters || !recorded->results.empty();
+    if (copied && recorded->buffer.mapped == nullptr) return;
+    const std::span<const std::byte> bytes(
+        recorded->buffer.mapped,
+        recorded->buffer.mapped != nullptr ? static_cast<std::size_t>(recorded->buffer.size) : 0);
+    if (!readBack(recorded->frame, bytes)) return;
+  }
 }
 
 Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
@@ -421,8 +483,7 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     needed = std::max(needed, copy.toOffset + copy.size);
   if (bytes.size() < needed) {
     return invalid("the read-back buffer of a frame has " + std::to_string(bytes.size()) +
-                   " bytes, fewer than the " + std::to_string(needed) +
-                   " that Plan::buffer returned");
+                   " bytes, fewer than the " + std::to_string(needed) + " that the frame copied");
   }
   culling_ = {};
   culling_.frame = frame;
@@ -447,15 +508,16 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
   return {};
 }
 
-Result<std::optional<Box>> SceneBooks::bounds(InstanceHandle handle) const {
-  const SceneInstance* instance = instances_.find(handle);
+Result<std::optional<Box>> Scene::bounds(InstanceHandle handle) const {
+  const SceneBooks& books = *books_;
+  const SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   if (!instance->bounds || instance->firstFrame == 0) return std::optional<Box>();
   // Not read back since the instance was first skinned: what is there is of another instance.
   const std::uint32_t result = instance->extras.result;
-  if (result >= resultFrames_.size() || resultFrames_[result] < instance->firstFrame)
+  if (result >= books.resultFrames_.size() || books.resultFrames_[result] < instance->firstFrame)
     return std::optional<Box>();
-  return latestResults_[result].box();
+  return books.latestResults_[result].box();
 }
 
 }  // namespace dermis

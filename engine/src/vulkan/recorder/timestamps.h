@@ -1,10 +1,10 @@
-// Measures the GPU time of what a SkinningSystem records.
+// Measures the GPU time of what a SceneRecorder records.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 
-#include "vulkan/system/functions.h"
+#include "vulkan/recorder/functions.h"
 
 namespace dermis::vulkan {
 

@@ -1,4 +1,4 @@
-// A buffer of a SkinningSystem, with its memory.
+// A buffer of a SceneRecorder, with its memory.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct BufferSource {
   std::uint64_t bytes = 0;  ///< of all existing buffers
 };
 
-class SystemBuffer {
+class OwnBuffer {
  public:
   struct Description {
     std::uint64_t size = 0;
@@ -26,12 +26,12 @@ class SystemBuffer {
     BufferUse use = BufferUse::device;
     const char* name = "";
   };
-  static Result<SystemBuffer> create(BufferSource& source, const Description& description);
+  static Result<OwnBuffer> create(BufferSource& source, const Description& description);
 
-  SystemBuffer() = default;
-  ~SystemBuffer();
-  SystemBuffer(SystemBuffer&& other) noexcept;
-  SystemBuffer& operator=(SystemBuffer&& other) noexcept;
+  OwnBuffer() = default;
+  ~OwnBuffer();
+  OwnBuffer(OwnBuffer&& other) noexcept;
+  OwnBuffer& operator=(OwnBuffer&& other) noexcept;
 
   VkBuffer handle() const { return created_.buffer; }
   std::uint64_t size() const { return size_; }
@@ -46,21 +46,6 @@ class SystemBuffer {
   BufferSource* source_ = nullptr;
   CreatedBuffer created_;
   std::uint64_t size_ = 0;
-};
-
-/// A buffer of the system, or a range of the engine. The next `record` may replace a buffer of the
-/// system by a larger one; it copies the contents, except palettes, which it converts again.
-struct GrowingBuffer {
-  SystemBuffer own;     ///< as of the last `record`
-  SystemBuffer larger;  ///< from the next one on
-  BufferRange engines;
-
-  /// For the next `record`.
-  BufferRange range() const {
-    if (engines.buffer != VK_NULL_HANDLE) return engines;
-    return larger.size() != 0 ? larger.range() : own.range();
-  }
-  BufferRange lastRange() const { return engines.buffer != VK_NULL_HANDLE ? engines : own.range(); }
 };
 
 }  // namespace dermis::vulkan

@@ -1,0 +1,181 @@
+// Records the frames of a scene (scene.h) into the engine's command buffers. A recorder owns the
+// scene and its buffers; the engine owns the device and the command buffers. An engine that manages
+// its own buffers and instances uses `Context` and plan.h instead.
+//
+//     vulkan::SceneRecorder recorder = *vulkan::SceneRecorder::create(context);
+//     Scene& scene = recorder.scene();
+//
+// and in each frame:
+//
+//     scene.beginFrame(frame, completedFrame);       // frame numbers of the engine
+//     std::span<JointMatrix> matrices = *scene.writePose(pose);   // for each pose that changes
+//     ... add, remove, change ...
+//     recorder.record(commandBuffer);                // with the engine's barriers before and after
+//     draw from recorder.outputBuffer() at scene.output(instance)
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "dermis/export.h"
+#include "dermis/handle.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/scene.h"
+#include "dermis/types.h"
+#include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/buffer_callbacks.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/handles.h"
+
+namespace dermis::vulkan {
+
+/// A part of a buffer that the CPU writes.
+struct MappedRange {
+  BufferRange range;
+  /// Address of the first byte of the range. The memory is host-coherent and stays mapped.
+  void* mapped = nullptr;
+};
+
+/// What `SceneRecorder::create` needs to know.
+struct SceneRecorderDescription {
+  SceneDescription scene;
+
+  // -- Optional: parts of buffers that the engine owns. If one is not set, the recorder creates the
+  // buffer. `SceneRecorder::requirement` returns the usage and alignment that a range needs. A
+  // range does not grow: its size is the capacity, and that of `scene` is ignored. Dermis reads and
+  // writes nothing outside the range. The engine destroys the buffer after the recorder.
+  BufferRange meshes;
+  MappedRange poses;     ///< for poses that the CPU writes
+  BufferRange gpuPoses;  ///< for poses that a GPU pass of the engine writes
+  BufferRange output;
+  /// What the engine uses the output buffer for, if the recorder creates it. For example
+  /// `vertexBufferUsage`, or that with `buildInputUsage` (acceleration_structure.h).
+  VkBufferUsageFlags outputUsage = vertexBufferUsage;
+
+  /// Create and destroy all other buffers. Set both functions or none. Buffers are created by
+  /// `SceneRecorder::create`, by functions of the scene that add something, by `Scene::change`, and
+  /// by `record` if a frame needs larger buffers for tables, uploads, read-back or culling. If not
+  /// set, the recorder allocates memory blocks: small ones first, and at most 64 MiB each unless
+  /// one buffer is larger.
+  BufferCallbacks buffers;
+  /// Whether the GPU time of each `record` is measured with timestamps. The queue family must
+  /// support them.
+  bool measuresGpuTime = false;
+  std::optional<Tuning> tuning;  ///< if empty: `Context::tuning`
+};
+
+/// What `SceneRecorder::record` needs to know.
+struct FrameDescription {
+  /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
+  /// holds `Scene::visibilityCount` words of 4 bytes. An instance is visible if the word at its
+  /// `visibilityIndex` is not 0. The engine's culling writes them on the GPU before `record`, with
+  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between (barrier.h).
+  VkBuffer visibility{};
+  /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
+  VkDeviceSize visibilityOffset = 0;
+};
+
+/// What `SceneRecorder::statistics` returns, besides `Scene::statistics`.
+struct RecorderStatistics {
+  // -- Of the last `record`; zeros after `Scene::abandonFrame`.
+  std::uint32_t dispatches = 0;     ///< direct and indirect
+  std::uint64_t workgroups = 0;     ///< of direct dispatches
+  std::uint32_t copies = 0;         ///< copy commands: tables, meshes, moved outputs, results
+  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and `FrameStatistics::poseBytes`
+  double planSeconds = 0;           ///< CPU time to plan the frame and write its tables
+  double recordSeconds = 0;         ///< CPU time to record the commands
+
+  /// GPU time of the newest complete frame, if `measuresGpuTime`.
+  std::optional<double> gpuSeconds;
+  /// Bytes of the memory blocks. With `BufferCallbacks`: bytes of all buffers that they created.
+  std::uint64_t deviceMemory = 0;
+};
+
+/// Owns a scene and the buffers for it. It does not submit, wait, or use a queue.
+///
+/// One thread at a time may call a function of the recorder or of its scene. Any thread may write
+/// the memory that `Scene::writePose` returns, until `record`.
+///
+/// The GPU must execute all frames one after the other, in the order of `record`; usually they are
+/// on one queue. The engine's own shaders cannot read the palettes of a scene: use `Context` and
+/// plan.h for that.
+class DERMIS_VULKAN_API SceneRecorder {
+ public:
+  /// Creates a scene, and the buffers with their initial capacities. The context must outlive the
+  /// recorder, but may be moved. Fails with `invalidArgument` if a member of the description is not
+  /// valid, with `limitExceeded` if an initial capacity needs a buffer larger than a storage buffer
+  /// range, with `missingEntryPoint`, with `vulkanError`, or with the error of
+  /// `BufferCallbacks::create`.
+  static Result<SceneRecorder> create(const Context& context,
+                                      const SceneRecorderDescription& description = {});
+
+  /// Call it before `create`, to find out what a range of the engine needs. `role` is `meshes`,
+  /// `poses`, `gpuPoses` or `positions` (the output). Returns usage and alignment, and the size for
+  /// the initial capacity in `description`. The alignment of the output need not be a power of two.
+  /// For other roles it returns the initial requirement; tables have size 0, since their size
+  /// depends on the frame. Creates nothing. Fails as `create` does.
+  static Result<BufferRequirement> requirement(const Context& context,
+                                               const SceneRecorderDescription& description,
+                                               BufferRole role);
+
+  /// The GPU must have completed every recorded frame.
+  ~SceneRecorder();
+  SceneRecorder(SceneRecorder&&) noexcept;
+  SceneRecorder& operator=(SceneRecorder&&) noexcept;
+
+  /// Stays at one address until the recorder is destroyed, even if the recorder is moved.
+  Scene& scene() const;
+
+  /// `Context::prepare` with `Scene::pipelineNeeds`: builds the pipelines that such an instance can
+  /// need. May take long. To build pipelines in another thread, call the two.
+  Result<void> prepare(const InstanceDescription& instance) const;
+
+  /// Records the uploads and the commands of the frame, with the barriers between them. Records
+  /// nothing if nothing changed and no instance is culled on the GPU. Call it once after each
+  /// `beginFrame`, outside a render pass, with a primary or secondary command buffer. Before it the
+  /// engine records the barrier between the last use of the output and `Use::dermis`, and after it
+  /// the barrier between `Use::dermis` and the next use (barrier.h).
+  ///
+  /// Fails with
+  /// - `notPrepared` if `prepare` was not called for such instances;
+  /// - `invalidArgument` if `beginFrame` was not called, or if instances are culled on the GPU and
+  ///   `FrameDescription::visibility` is null;
+  /// - `limitExceeded` if the tables are larger than a storage buffer range;
+  /// - `vulkanError`, or the error of `BufferCallbacks::create`.
+  ///
+  /// If it fails, nothing is recorded, and the next `record` does all of the work. If the frame is
+  /// not submitted, call `Scene::abandonFrame`.
+  Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
+
+  /// The buffer that holds all outputs as of the last `record`: one that the recorder created, or
+  /// the buffer of `SceneRecorderDescription::output`. Offsets of outputs count from its beginning.
+  VkBuffer outputBuffer() const;
+  /// A number that changes whenever `outputBuffer` becomes another buffer: when it grew, or when
+  /// the frame in which it grew was abandoned. Offsets stay the same when it grows.
+  std::uint64_t outputGeneration() const;
+
+  /// Where a GPU pass of the engine writes the joint matrices of a pose: consecutive `JointMatrix`,
+  /// 48 bytes each. The range stays the same until the pose is removed. Poses of one call of
+  /// `addPoses` are consecutive in one buffer, and the offset of the first is a multiple of
+  /// minStorageBufferOffsetAlignment, so that it can be bound. Poses of different calls may be in
+  /// different buffers. A buffer that the recorder created has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+  /// and VK_BUFFER_USAGE_TRANSFER_DST_BIT.
+  ///
+  /// The engine records `barrierBetween(Use::dermis, Use::computeWrite)`, as frames in flight may
+  /// still read the matrices, then its pass, then `barrierBetween(Use::computeWrite, Use::dermis)`;
+  /// and it calls `Scene::markWritten`. Fails with
+  /// `invalidArgument` for a pose that the CPU writes.
+  Result<BufferRange> poseRange(PoseHandle pose) const;
+
+  /// Of the last frame that was recorded.
+  RecorderStatistics statistics() const;
+
+ private:
+  SceneRecorder();
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace dermis::vulkan

@@ -1,0 +1,200 @@
+// Meshes and poses.
+
+#include "scene/books.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "plan/check.h"
+#include "scene/slot_map.h"
+
+namespace dermis {
+namespace {
+
+Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
+  return {ErrorCode::invalidArgument, std::string(kind) + " " + std::to_string(index) +
+                                          " is used by " + std::to_string(users) + " instance" +
+                                          (users == 1 ? "" : "s")};
+}
+
+}  // namespace
+
+// -- Meshes and poses.
+
+Result<MeshHandle> Scene::addMesh(PackedMesh mesh) {
+  return changed().addMesh(mesh.info(), &mesh);
+}
+
+Result<MeshHandle> SceneBooks::addMesh(const MeshInfo& info, PackedMesh* mesh) {
+  if (Result<void> good = checkMeshInfo(info, {"the mesh"}); !good) return good.error();
+  const Result<std::optional<Range>> bytes = take(meshStore_, info.byteSize, packedMeshAlignment);
+  if (!bytes) return bytes.error();
+  if (!*bytes) {
+    return noRoom("a packed mesh takes " + std::to_string(info.byteSize) + " bytes", meshStore_,
+                  "bytes of meshes");
+  }
+  if (mesh != nullptr && owner_.meshAdded != nullptr) {
+    if (Result<void> good = owner_.meshAdded(owner_.user, (*bytes)->offset, *mesh); !good) {
+      meshStore_.ranges.free(**bytes);
+      return good.error();
+    }
+  }
+  const MeshHandle handle = meshes_.add({info, **bytes, 0});
+  if (mesh != nullptr && owner_.meshAdded == nullptr)
+    meshUploads_.push_back({handle, std::move(*mesh)});
+  return handle;
+}
+
+Result<void> Scene::removeMesh(MeshHandle handle) {
+  SceneBooks& books = changed();
+  const SceneMesh* mesh = books.meshes_.find(handle);
+  if (mesh == nullptr) return unknownHandle("mesh", handle);
+  if (mesh->users != 0) return isUsed("mesh", handle.index, mesh->users);
+  books.retire(books.meshStore_.ranges, mesh->bytes);
+  std::erase_if(books.meshUploads_, [&](const auto& upload) { return upload.mesh == handle; });
+  if (books.owner_.meshRemoved != nullptr)
+    books.owner_.meshRemoved(books.owner_.user, mesh->bytes.offset);
+  books.meshes_.remove(handle);
+  return {};
+}
+
+Result<PoseHandle> Scene::addPose(std::uint32_t jointCount, const PoseOptions& options) {
+  PoseHandle pose;
+  if (Result<void> added = addPoses({&pose, 1}, jointCount, options); !added) return added.error();
+  return pose;
+}
+
+Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
+                             const PoseOptions& options) {
+  SceneBooks& books = changed();
+  if (jointCount == 0 || jointCount > maxPoseJoints) {
+    return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
+                                                 " joints, not " + std::to_string(jointCount)};
+  }
+  if (options.writer > PoseWriter::gpu)
+    return notAValue("the writer of the pose", options.writer, "PoseWriter");
+  const bool isCpu = options.writer == PoseWriter::cpu;
+  if (books.owner_.isCpu && !isCpu)
+    return invalid("a pose that the GPU writes cannot be skinned on the CPU");
+  if (poses.empty()) return {};
+  ScenePose pose;
+  const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
+  const Result<std::optional<Range>> joints = books.takeJoints(count, options.writer, pose.buffer);
+  if (!joints) return joints.error();
+  if (!*joints) return books.noJoints(poses.size(), count, options.writer);
+  pose.jointCount = jointCount;
+  pose.mayScale = options.mayScale;
+  pose.writer = options.writer;
+  const std::uint64_t size = std::uint64_t{jointCount} * books.slotsOf(options.writer);
+  for (std::size_t index = 0; index < poses.size(); ++index) {
+    pose.joints = {(*joints)->offset + index * size, size};
+    poses[index] = books.poses_.add(pose);
+    if (!isCpu) continue;
+    // No frame in flight reads their memory: it was free.
+    std::ranges::fill(books.matricesOf(pose), JointMatrix{});
+    books.upload(poses[index]);
+  }
+  return {};
+}
+
+Result<void> Scene::removePose(PoseHandle handle) {
+  SceneBooks& books = changed();
+  const ScenePose* pose = books.poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->users != 0) return isUsed("pose", handle.index, pose->users);
+  books.retire(books.poseBuffers_[pose->buffer].joints, pose->joints);
+  for (std::size_t form = 0; form < paletteFormCount; ++form) {
+    const std::uint32_t unit = pose->forms[form].unit;
+    if (unit == notUsed) continue;
+    books.retire(books.unitStore_.ranges, {unit, paletteSize(static_cast<PaletteForm>(form),
+                                                             pose->jointCount, pose->mayScale)});
+  }
+  books.poses_.remove(handle);
+  return {};
+}
+
+Result<BufferPart> SceneBooks::posePart(PoseHandle handle) const {
+  const ScenePose* pose = poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->writer == PoseWriter::cpu) {
+    return invalid("pose " + std::to_string(handle.index) +
+                   " is written by the CPU; use writePose");
+  }
+  return BufferPart{poseBuffers_[pose->buffer].buffer.number, offsetOf(*pose),
+                    pose->jointCount * sizeof(JointMatrix)};
+}
+
+std::span<JointMatrix> SceneBooks::matricesOf(const ScenePose& pose) {
+  PoseStore& store = poseBuffers_[pose.buffer];
+  JointMatrix* const begin = store.buffer.mapped != nullptr
+                                 ? reinterpret_cast<JointMatrix*>(store.buffer.mapped)
+                                 : store.staged.data();
+  return {begin + offsetOf(pose) / sizeof(JointMatrix), pose.jointCount};
+}
+
+Result<void> SceneBooks::checkWrite(PoseHandle handle, PoseWriter writer) const {
+  // Before the first frame, poses are written for it.
+  if (!hasBegun_ && frame_ != 0)
+    return invalid("a pose can be written only between beginFrame and record");
+  const ScenePose* pose = poses_.find(handle);
+  if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->writer == writer) return {};
+  return invalid("pose " + std::to_string(handle.index) +
+                 (writer == PoseWriter::cpu ? " is written by the GPU; use markWritten"
+                                            : " is written by the CPU; use writePose"));
+}
+
+void SceneBooks::markWritten(ScenePose& pose, PoseHandle handle) {
+  pose.poseFrame = frame_;
+  ++pose.version;
+  posed_.push_back(handle);
+}
+
+Result<std::span<JointMatrix>> Scene::writePose(PoseHandle handle) {
+  SceneBooks& books = changed();
+  if (Result<void> good = books.checkWrite(handle, PoseWriter::cpu); !good) return good.error();
+  ScenePose& pose = books.poses_.at(handle.index);
+  if (pose.poseFrame != books.frame_) {
+    // The next of its slots: the GPU is done with it, since it was superseded at least as many
+    // recorded frames ago as there may be in flight. What no recorded frame reads is overwritten.
+    if (pose.poseFrame <= books.recordedFrame_)
+      pose.slot = (pose.slot + 1) % books.description_.framesInFlight;
+    books.markWritten(pose, handle);
+    books.upload(handle);
+  }
+  return books.matricesOf(pose);
+}
+
+Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
+  SceneBooks& books = changed();
+  for (const PoseHandle handle : poses) {
+    if (Result<void> good = books.checkWrite(handle, PoseWriter::gpu); !good) return good;
+    ScenePose& pose = books.poses_.at(handle.index);
+    if (pose.poseFrame != books.frame_) books.markWritten(pose, handle);
+  }
+  return {};
+}
+
+Result<void> Scene::markAllWritten() {
+  SceneBooks& books = changed();
+  for (std::uint32_t index = 0; index < books.poses_.capacity(); ++index) {
+    if (!books.poses_.isUsed(index) || books.poses_.at(index).writer != PoseWriter::gpu) continue;
+    const PoseHandle handle = books.poses_.handleOf(index);
+    if (Result<void> marked = markWritten({&handle, 1}); !marked) return marked;
+  }
+  return {};
+}
+
+SceneStatistics Scene::statistics() const {
+  const SceneBooks& books = *books_;
+  const auto of = [](const Store& store) {
+    return StoreStatistics{store.ranges.capacity() * store.unitBytes,
+                           store.ranges.used() * store.unitBytes,
+                           store.ranges.largestFree() * store.unitBytes};
+  };
+  return {books.committed_, books.culling_, of(books.meshStore_), of(books.unitStore_),
+          of(books.outputStore_)};
+}
+
+}  // namespace dermis

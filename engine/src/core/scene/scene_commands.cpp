@@ -1,0 +1,57 @@
+#include "dermis/scene_commands.h"
+
+#include <string>
+#include <utility>
+
+#include "plan/check.h"
+#include "scene/books.h"
+
+namespace dermis {
+
+struct SceneCommands::State {
+  std::unique_ptr<Scene> scene;
+  Plan plan;
+};
+
+SceneCommands::SceneCommands() = default;
+SceneCommands::~SceneCommands() = default;
+SceneCommands::SceneCommands(SceneCommands&&) noexcept = default;
+SceneCommands& SceneCommands::operator=(SceneCommands&&) noexcept = default;
+
+Result<SceneCommands> SceneCommands::create(const SceneCommandsDescription& description) {
+  if (description.memory.create == nullptr || description.memory.release == nullptr)
+    return invalid("SceneCommandsDescription::memory needs both of its functions");
+  SceneOwner owner;
+  owner.memory = description.memory;
+  Result<std::unique_ptr<Scene>> scene = SceneAccess::create(
+      {description.scene, description.limits, description.tuning, description.outputOffset}, owner);
+  if (!scene) return scene.error();
+  SceneCommands commands;
+  commands.state_ = std::make_unique<State>();
+  commands.state_->scene = std::move(*scene);
+  return commands;
+}
+
+Scene& SceneCommands::scene() const {
+  return *state_->scene;
+}
+
+Result<std::span<const Command>> SceneCommands::plan() {
+  if (Result<void> planned = SceneAccess::books(scene()).plan(state_->plan); !planned)
+    return planned.error();
+  return state_->plan.commands();
+}
+Result<void> SceneCommands::commit() {
+  return SceneAccess::books(scene()).commit();
+}
+Result<void> SceneCommands::readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
+  return SceneAccess::books(scene()).readBack(frame, bytes);
+}
+std::uint32_t SceneCommands::outputBuffer() const {
+  return SceneAccess::books(scene()).output_;
+}
+Result<BufferPart> SceneCommands::posePart(PoseHandle pose) const {
+  return SceneAccess::books(scene()).posePart(pose);
+}
+
+}  // namespace dermis

@@ -1,0 +1,270 @@
+// The interface of SceneRecorder, and its buffers.
+
+#include "dermis/vulkan/scene_recorder.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "plan/check.h"
+#include "vulkan/recorder/state.h"
+
+namespace dermis::vulkan {
+namespace {
+
+Error wrongField(const std::string& what) {
+  return {ErrorCode::invalidArgument, "SceneRecorderDescription::" + what};
+}
+
+Result<void> checkRange(const char* name, const BufferRange& range, std::uint64_t unit,
+                        std::uint32_t alignment) {
+  if (range.buffer == VK_NULL_HANDLE) {
+    if (range.offset == 0 && range.size == 0) return {};
+    return wrongField(std::string(name) + " has no buffer");
+  }
+  if (range.size < unit || range.size % 4 != 0) {
+    return wrongField(std::string(name) + " has " + std::to_string(range.size) +
+                      " bytes; it needs a multiple of 4, at least " + std::to_string(unit));
+  }
+  if (range.offset % alignment != 0) {
+    return wrongField(std::string(name) + " begins at " + std::to_string(range.offset) +
+                      " bytes, not at a multiple of " + std::to_string(alignment) +
+                      " (SceneRecorder::requirement)");
+  }
+  return {};
+}
+
+Result<void> checkRanges(const SceneRecorderDescription& description, const DeviceLimits& limits) {
+  const std::uint64_t joint = sizeof(JointMatrix);
+  const std::uint32_t alignment = limits.minStorageBufferOffsetAlignment;
+  for (const auto& [name, range, unit, multiple] :
+       {std::tuple{"meshes", &description.meshes, std::uint64_t{packedMeshAlignment}, alignment},
+        {"poses.range", &description.poses.range, joint * description.scene.framesInFlight,
+         alignment},
+        {"gpuPoses", &description.gpuPoses, joint, alignment},
+        {"output", &description.output, std::uint64_t{4}, outputRangeAlignment(limits)}}) {
+    if (Result<void> good = checkRange(name, *range, unit, multiple); !good) return good;
+  }
+  const MappedRange& poses = description.poses;
+  if ((poses.range.buffer == VK_NULL_HANDLE) != (poses.mapped == nullptr))
+    return wrongField("poses needs both a range and the address where it is mapped");
+  return {};
+}
+
+/// The size of a range is its capacity: it does not grow.
+SceneSetup setupOf(const SceneRecorderDescription& description, const ContextState& context) {
+  const auto fix = [](Capacity& capacity, const BufferRange& range, std::uint64_t unit,
+                      std::uint64_t multiple) {
+    if (range.buffer != VK_NULL_HANDLE)
+      capacity = Capacity::fixed(range.size / multiple * multiple / unit);
+  };
+  SceneSetup setup{description.scene, context.limits, description.tuning.value_or(context.tuning),
+                   description.output.offset};
+  constexpr std::uint64_t joint = sizeof(JointMatrix);
+  // 0 frames in flight are refused by the scene.
+  const std::uint64_t slots = std::max(setup.scene.framesInFlight, 1u);
+  fix(setup.scene.meshCapacity, description.meshes, 1, packedMeshAlignment);
+  fix(setup.scene.jointCapacity, description.poses.range, joint * slots, 1);
+  fix(setup.scene.gpuJointCapacity, description.gpuPoses, joint, 1);
+  fix(setup.scene.outputCapacity, description.output, 1, 1);
+  return setup;
+}
+
+const char* nameOf(BufferRole role) {
+  switch (role) {
+    case BufferRole::meshes:
+      return "dermis meshes";
+    case BufferRole::poses:
+      return "dermis poses";
+    case BufferRole::gpuPoses:
+      return "dermis GPU poses";
+    case BufferRole::palettes:
+      return "dermis palettes";
+    case BufferRole::results:
+      return "dermis results";
+    case BufferRole::history:
+      return "dermis history";
+    case BufferRole::counters:
+      return "dermis counters";
+    case BufferRole::tables:
+      return "dermis tables";
+    case BufferRole::readBack:
+      return "dermis read-back";
+    default:
+      return "dermis output";
+  }
+}
+
+}  // namespace
+
+SceneRecorder::SceneRecorder() = default;
+SceneRecorder::~SceneRecorder() = default;
+SceneRecorder::SceneRecorder(SceneRecorder&&) noexcept = default;
+SceneRecorder& SceneRecorder::operator=(SceneRecorder&&) noexcept = default;
+
+SceneRecorder::State::~State() {
+  for (BoundBuffer& buffer : bound) destroyTexelViews(*context, buffer);
+}
+
+Result<SceneRecorder> SceneRecorder::create(const Context& lent,
+                                            const SceneRecorderDescription& description) {
+  if ((description.buffers.create == nullptr) != (description.buffers.destroy == nullptr))
+    return wrongField("buffers needs both of its functions");
+  const ContextState& context = *lent.state_;
+  if (Result<void> good = checkRanges(description, context.limits); !good) return good.error();
+  // Before anything is created.
+  const SceneSetup setup = setupOf(description, context);
+  if (Result<void> good = checkSetup(rounded(setup)); !good) return good.error();
+  Result<SystemFunctions> functions = loadSystemFunctions(context);
+  if (!functions) return functions.error();
+
+  SceneRecorder recorder;
+  recorder.state_ = std::make_unique<State>(context, description);
+  State& state = *recorder.state_;
+  state.functions = *functions;
+  state.source.context = &context;
+  state.source.callbacks = description.buffers;
+  if (description.buffers.create == nullptr) {
+    state.blocks = std::make_unique<MemoryBlocks>(context, state.functions);
+    state.source.callbacks = state.blocks->callbacks();
+  }
+  state.bound.resize(visibilityBuffer + 1);
+  state.slots.resize(description.scene.framesInFlight);
+  for (FrameSlot& slot : state.slots) slot.sets.context = &context;
+  if (description.measuresGpuTime) {
+    if (Result<void> made =
+            state.timestamps.create(context, state.functions, description.scene.framesInFlight);
+        !made)
+      return made.error();
+  }
+  SceneOwner owner;
+  owner.user = &state;
+  owner.memory = {
+      &state,
+      [](void* user, const SceneBuffer& wanted) {
+        return static_cast<State*>(user)->createBuffer(wanted);
+      },
+      [](void* user, std::uint32_t number) { static_cast<State*>(user)->releaseBuffer(number); }};
+  owner.frameBegun = [](void* user, std::uint64_t completedFrame) {
+    static_cast<State*>(user)->frameBegun(completedFrame);
+  };
+  owner.frameAbandoned = [](void* user) {
+    State& abandoned = *static_cast<State*>(user);
+    --abandoned.recordCount;
+    abandoned.slot().frame = 0;  // it is free again
+    abandoned.statistics = {.gpuSeconds = abandoned.statistics.gpuSeconds};
+  };
+  Result<std::unique_ptr<Scene>> scene = SceneAccess::create(setup, owner);
+  if (!scene) return scene.error();
+  state.scene = std::move(*scene);
+  return recorder;
+}
+
+Result<BufferRequirement> SceneRecorder::requirement(const Context& context,
+                                                     const SceneRecorderDescription& description,
+                                                     BufferRole role) {
+  const SceneSetup setup = rounded(setupOf(description, *context.state_));
+  if (Result<void> good = checkSetup(setup); !good) return good.error();
+  if (static_cast<std::size_t>(role) >= bufferRoleCount)
+    return notAValue("the role of the buffer", role, "BufferRole");
+  BufferRequirement needed = sceneSizes(setup).requirement(role, 0, setup.limits);
+  if (role == BufferRole::positions && description.output.buffer == VK_NULL_HANDLE)
+    needed.usage |= description.outputUsage;
+  return needed;
+}
+
+Scene& SceneRecorder::scene() const {
+  return *state_->scene;
+}
+
+Result<void> SceneRecorder::prepare(const InstanceDescription& instance) const {
+  const Result<PipelineNeeds> needs = state_->scene->pipelineNeeds(instance);
+  if (!needs) return needs.error();
+  return state_->context->prepare(*needs, state_->books().tuning_);
+}
+
+Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const FrameDescription& frame) {
+  return state_->recordFrame(commandBuffer, frame);
+}
+
+VkBuffer SceneRecorder::outputBuffer() const {
+  return state_->bound[state_->books().output_].range.buffer;
+}
+std::uint64_t SceneRecorder::outputGeneration() const {
+  return state_->books().output_;
+}
+
+Result<BufferRange> SceneRecorder::poseRange(PoseHandle pose) const {
+  const Result<BufferPart> part = state_->books().posePart(pose);
+  if (!part) return part.error();
+  const BufferRange& buffer = state_->bound[part->buffer].range;
+  return BufferRange{buffer.buffer, buffer.offset + part->offset, part->size};
+}
+
+RecorderStatistics SceneRecorder::statistics() const {
+  RecorderStatistics statistics = state_->statistics;
+  statistics.deviceMemory =
+      state_->blocks != nullptr ? state_->blocks->bytes() : state_->source.bytes;
+  return statistics;
+}
+
+/// A range of the engine, or a new buffer.
+Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
+  BufferRange range;
+  void* mapped = nullptr;
+  if (wanted.role == BufferRole::meshes) range = description.meshes;
+  if (wanted.role == BufferRole::positions) range = description.output;
+  if (wanted.role == BufferRole::gpuPoses) range = description.gpuPoses;
+  if (wanted.role == BufferRole::poses) {
+    range = description.poses.range;
+    mapped = description.poses.mapped;
+  }
+  OwnBuffer own;
+  if (range.buffer != VK_NULL_HANDLE) {
+    range.size = wanted.requirement.size;  // whole objects, of which kernels can see all
+  } else {
+    VkBufferUsageFlags usage = wanted.requirement.usage;
+    if (wanted.role == BufferRole::positions) usage |= description.outputUsage;
+    const BufferUse use = !wanted.isMapped                      ? BufferUse::device
+                          : wanted.role == BufferRole::readBack ? BufferUse::readBack
+                                                                : BufferUse::upload;
+    Result<OwnBuffer> made =
+        OwnBuffer::create(source, {wanted.requirement.size, usage, use, nameOf(wanted.role)});
+    if (!made) return made.error();
+    own = std::move(*made);
+    range = own.range();
+    if (wanted.isMapped) mapped = own.bytes().data();
+  }
+  BoundBuffer buffer{range};
+  if (Result<void> made = createTexelViews(*context, wanted.role, true, buffer); !made)
+    return made.error();
+  buffers.resize(std::max(buffers.size(), wanted.number + std::size_t{1}));
+  bound.resize(buffers.size());
+  buffers[wanted.number] = std::move(own);
+  bound[wanted.number] = buffer;
+  return mapped;
+}
+
+void SceneRecorder::State::releaseBuffer(std::uint32_t number) {
+  destroyTexelViews(*context, bound[number]);
+  bound[number] = {};
+  buffers[number] = OwnBuffer();
+}
+
+/// Reads the GPU time of the newest complete frame, and frees what complete frames uploaded.
+void SceneRecorder::State::frameBegun(std::uint64_t completedFrame) {
+  for (FrameSlot& frameSlot : slots) {
+    if (frameSlot.frame > completedFrame) continue;
+    if (!frameSlot.isStagingKept) frameSlot.staging = OwnBuffer();
+    if (frameSlot.frame <= timedFrame) continue;
+    timedFrame = frameSlot.frame;
+    statistics.gpuSeconds.reset();
+    if (frameSlot.hasTimestamps)
+      statistics.gpuSeconds =
+          timestamps.seconds(static_cast<std::uint32_t>(&frameSlot - slots.data()));
+  }
+}
+
+}  // namespace dermis::vulkan

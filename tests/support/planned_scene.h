@@ -1,0 +1,98 @@
+// A scene whose buffers are only counted: for tests of what its frames list.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dermis/scene_commands.h"
+#include "plan/plan_data.h"
+#include "plan_commands.h"
+#include "scene/books.h"
+#include "scene_meshes.h"
+
+namespace dermis::test {
+
+class PlannedScene {
+ public:
+  explicit PlannedScene(const SceneCommandsDescription& description) : PlannedScene() {
+    must(tryToCreate(description));
+  }
+  PlannedScene() = default;
+  PlannedScene(const PlannedScene&) = delete;
+  PlannedScene& operator=(const PlannedScene&) = delete;
+
+  /// The memory of the description is not used.
+  Result<void> tryToCreate(const SceneCommandsDescription& description) {
+    SceneOwner owner;
+    owner.memory = {this,
+                    [](void* user, const SceneBuffer& wanted) {
+                      return static_cast<PlannedScene*>(user)->create(wanted);
+                    },
+                    [](void* user, std::uint32_t number) {
+                      EXPECT_EQ(static_cast<PlannedScene*>(user)->buffers.erase(number), 1u);
+                    }};
+    Result<std::unique_ptr<Scene>> made = SceneAccess::create(
+        {description.scene, description.limits, description.tuning, description.outputOffset},
+        owner);
+    if (!made) return made.error();
+    scene_ = std::move(*made);
+    return {};
+  }
+
+  Scene& scene() const { return *scene_; }
+  SceneBooks& books() const { return SceneAccess::books(*scene_); }
+  /// Without its bytes.
+  Result<MeshHandle> addMesh(const MeshInfo& info) {
+    return SceneAccess::changed(*scene_).addMesh(info, nullptr);
+  }
+  Result<void> plan() { return books().plan(planned); }
+  Result<void> commit() { return books().commit(); }
+  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
+    return books().readBack(frame, bytes);
+  }
+  void record() {
+    must(plan());
+    must(commit());
+  }
+  /// Of the buffer with this role, the newest one; 0 if there is none.
+  std::uint64_t sizeOf(BufferRole role) const {
+    std::uint64_t size = 0;
+    for (const auto& [number, buffer] : buffers) {
+      if (buffer.role == role) size = buffer.requirement.size;
+    }
+    return size;
+  }
+  BufferRole roleOf(std::uint32_t number) const {
+    return number == visibilityBuffer ? BufferRole::visibility : buffers.at(number).role;
+  }
+
+  std::map<std::uint32_t, SceneBuffer> buffers;  ///< by number
+  std::vector<SceneBuffer> asked;                ///< all that were
+  /// Refuses a buffer, if it returns an error.
+  std::function<Result<void>(const SceneBuffer&)> refuses;
+  bool mapsPoses = true;
+  Plan planned;
+
+ private:
+  Result<void*> create(const SceneBuffer& wanted) {
+    asked.push_back(wanted);
+    if (refuses) {
+      if (Result<void> good = refuses(wanted); !good) return good.error();
+    }
+    EXPECT_TRUE(buffers.emplace(wanted.number, wanted).second) << "a number is used again";
+    if (wanted.role != BufferRole::poses || !mapsPoses) return static_cast<void*>(nullptr);
+    memory_.emplace_back(wanted.requirement.size);
+    return static_cast<void*>(memory_.back().data());
+  }
+
+  std::unique_ptr<Scene> scene_;
+  std::vector<std::vector<std::byte>> memory_;
+};
+
+}  // namespace dermis::test
