@@ -62,6 +62,10 @@ check() { # PREFIX: checks that programs find Dermis there, and skin
     \$(pkg-config --cflags --libs dermis dermis_verify vulkan) -o /root/try/by_pkg_config"
   inside /root/try/by_pkg_config
   expect "every vertex is right"
+  if [ "$release" != bookworm ]; then # which has no Vulkan Memory Allocator
+    inside sh -c "PKG_CONFIG_PATH=$paths; export PKG_CONFIG_PATH; printf '#include <%s>\n' vk_mem_alloc.h dermis/vulkan/vma.h |
+      g++ -std=c++20 -fsyntax-only \$(pkg-config --cflags dermis) -x c++ -"
+  fi
 }
 
 check_packages() { # PACKAGE...: installs them with their dependencies, checks and removes them
@@ -86,6 +90,7 @@ say "making a clean system"
 rm -rf "$root"
 mkdir -p "$root"
 debootstrap --variant=minbase "$release" "$root" "$site" >"$root.log" 2>&1 || { tail -n 20 "$root.log"; exit 1; }
+[ "$release" = bookworm ] || tools="$tools libvulkan-memory-allocator-dev"
 # shellcheck disable=SC2086 # a list of words
 apt install $tools
 

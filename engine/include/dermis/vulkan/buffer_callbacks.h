@@ -11,13 +11,13 @@ namespace dermis::vulkan {
 /// Who uses the memory of a buffer. This decides on the memory type.
 enum class BufferUse : std::uint8_t {
   /// Only the GPU: device-local if possible.
-  device,
+  device = 0,
   /// The CPU writes it and never reads it, the GPU reads it: host-visible and host-coherent, also
   /// device-local if possible.
-  upload,
+  upload = 1,
   /// The GPU writes it, the CPU reads it: host-visible and host-coherent, also host-cached if
   /// possible.
-  readBack,
+  readBack = 2,
 };
 
 /// What `BufferCallbacks::create` creates.
@@ -40,9 +40,8 @@ struct CreatedBuffer {
 };
 
 /// Create and destroy the buffers of a SceneRecorder. They are called in the thread that calls the
-/// recorder or its scene, and may call Vulkan. They must not throw, and must not call either.
-/// With the Vulkan Memory Allocator, `create` calls
-/// vmaCreateBuffer with `info`, and `destroy` calls vmaDestroyBuffer.
+/// recorder or its scene, and may call Vulkan. They must not throw, and must not call either. vma.h
+/// has them for the Vulkan Memory Allocator.
 struct BufferCallbacks {
   void* user = nullptr;  ///< passed to both functions
   /// Creates a buffer and binds memory to it. If it fails, the function that needs it fails

@@ -1,6 +1,6 @@
 // All headers of dermis::vulkan except vertex_input.h and acceleration_structure.h, which include
-// vulkan_core.h. An engine that uses volk includes volk.h before those two, or defines
-// VK_NO_PROTOTYPES.
+// vulkan_core.h, and vma.h, which needs vk_mem_alloc.h. An engine that uses volk includes volk.h
+// before the first two, or defines VK_NO_PROTOTYPES.
 #pragma once
 
 #include "dermis/vulkan/barrier.h"
