@@ -103,8 +103,8 @@ class MeshMaker {
   static constexpr std::array displacementTypes{ComponentType::float32, ComponentType::float16,
                                                 ComponentType::snorm16};
   static constexpr std::array centerTypes{ComponentType::float32};
-  static constexpr std::array jointTypes{ComponentType::uint8, ComponentType::uint16,
-                                         ComponentType::uint32};
+  static constexpr std::array jointTypes{ComponentType::float32, ComponentType::uint8,
+                                         ComponentType::uint16, ComponentType::uint32};
   static constexpr std::array weightTypes{ComponentType::float32, ComponentType::unorm8,
                                           ComponentType::unorm16};
 
