@@ -10,9 +10,11 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -497,6 +499,27 @@ TEST_F(EnumValuesTest, NoEnumIsMissing) {
     }
   }
   EXPECT_EQ(found, known);
+}
+
+/// Files and other languages store the numbers: inserting a value must not change the others.
+TEST_F(EnumValuesTest, EveryValueIsWritten) {
+  const std::regex declaration("enum class \\w+ : std::uint\\d+_t \\{([^}]*)\\};");
+  const std::regex comment("//[^\n]*"), value("\\s*\\w+ = \\d+\\s*"), space("\\s*");
+  int enums = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+           std::filesystem::path(sourceFolder) / "engine/include")) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream file(entry.path());
+    std::string text(std::istreambuf_iterator<char>(file), {});
+    text = std::regex_replace(text, comment, "");
+    for (std::sregex_iterator match(text.begin(), text.end(), declaration), end; match != end;
+         ++match, ++enums) {
+      std::istringstream values((*match)[1]);
+      for (std::string one; std::getline(values, one, ',');)
+        EXPECT_TRUE(std::regex_match(one, value) || std::regex_match(one, space)) << one;
+    }
+  }
+  EXPECT_GT(enums, 20);
 }
 
 }  // namespace

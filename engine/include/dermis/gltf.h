@@ -60,7 +60,7 @@ struct Skin {
 };
 
 /// How alpha is used, as in glTF 2.0.
-enum class AlphaMode : std::uint8_t { opaque, mask, blend };
+enum class AlphaMode : std::uint8_t { opaque = 0, mask = 1, blend = 2 };
 
 /// An image as it is in the file: PNG or JPEG, not decoded.
 struct Image {
@@ -69,7 +69,7 @@ struct Image {
 };
 
 /// How texture coordinates outside [0, 1] are used, as in glTF 2.0.
-enum class Wrap : std::uint8_t { repeat, mirroredRepeat, clampToEdge };
+enum class Wrap : std::uint8_t { repeat = 0, mirroredRepeat = 1, clampToEdge = 2 };
 
 /// A texture of a material.
 struct TextureUse {
@@ -205,9 +205,9 @@ struct Mesh {
 };
 
 /// How values between keys are computed, as in glTF 2.0.
-enum class Interpolation : std::uint8_t { step, linear, cubicSpline };
+enum class Interpolation : std::uint8_t { step = 0, linear = 1, cubicSpline = 2 };
 /// The property that a channel animates.
-enum class ChannelPath : std::uint8_t { translation, rotation, scale, weights };
+enum class ChannelPath : std::uint8_t { translation = 0, rotation = 1, scale = 2, weights = 3 };
 
 /// One animated property of one node. A clip has at most one channel for a node and a path.
 struct Channel {

@@ -34,19 +34,19 @@ struct OutputAttribute {
 
 /// Where previous positions come from. An engine needs them for motion vectors.
 enum class Motion : std::uint8_t {
-  none,  ///< there are no previous positions
+  none = 0,  ///< there are no previous positions
   /// Copied from the output before it is overwritten: the positions of the last time that the
   /// instance was skinned. Costs a read and a write. The output must persist between frames.
-  kept,
+  kept = 1,
 };
 
 /// How the attributes of many vertices are arranged.
 enum class Arrangement : std::uint8_t {
   /// One vertex after the other. In each vertex: position, normal, tangent, previous position, each
   /// at a multiple of `formatAlignment`.
-  interleaved,
+  interleaved = 0,
   /// One attribute after the other. Each begins at a multiple of 48 bytes.
-  planar,
+  planar = 1,
 };
 
 /// The attributes of skinned vertices, their formats and their arrangement. Method and layout

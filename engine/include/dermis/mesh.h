@@ -14,15 +14,15 @@ namespace dermis {
 /// is the integer divided by its maximum, and the value of a `snorm` type is the same, but at least
 /// -1. float16 is IEEE 754 binary16.
 enum class ComponentType : std::uint8_t {
-  float32,
-  float16,
-  snorm8,
-  snorm16,
-  unorm8,
-  unorm16,
-  uint8,
-  uint16,
-  uint32
+  float32 = 0,
+  float16 = 1,
+  snorm8 = 2,
+  snorm16 = 3,
+  unorm8 = 4,
+  unorm16 = 5,
+  uint8 = 6,
+  uint16 = 7,
+  uint32 = 8,
 };
 
 /// Bytes of one component.

@@ -16,30 +16,30 @@ namespace dermis {
 /// docs/methods.md describes each.
 enum class Method : std::uint8_t {
   /// Linear blend skinning: blends the joint matrices. The mesh collapses where joints twist.
-  linear,
+  linear = 0,
   /// Dual-quaternion linear blending, DLB (Kavan et al. 2007, section 4). The mesh bulges where
   /// joints bend.
-  dualQuaternion,
+  dualQuaternion = 1,
   /// Dual-quaternion iterative blending, DIB (Kavan et al. 2008): refines the result of DLB in at
   /// most 20 steps. For comparison.
-  dualQuaternionIterative,
+  dualQuaternionIterative = 2,
   /// Blends the logarithms of the rigid parts as matrices (Cordier and Magnenat-Thalmann 2005,
   /// Alexa 2002). May rotate the long way round. For comparison.
-  logMatrix,
+  logMatrix = 3,
   /// Spherical blend skinning (Kavan and Žára 2005): blends quaternions about a center of rotation
   /// that is computed for each vertex and pose. For comparison.
-  sphericalBlend,
+  sphericalBlend = 4,
   /// Blends quaternions and translations separately (Hejl 2004). The mesh tears at vertices whose
   /// joints do not meet. For comparison.
-  quaternionTranslation,
+  quaternionTranslation = 5,
   /// Interpolates between `linear` and `dualQuaternion`, by `MeshView::dualQuaternionWeights`.
-  blended,
+  blended = 6,
   /// Blends quaternions about centers of rotation that are computed once, at import (Le and Hodgins
   /// 2016). Does not collapse, and bulges less. Requires `MeshView::centersOfRotation`.
-  centerOfRotation,
+  centerOfRotation = 7,
   /// `dualQuaternion`, moved towards `centerOfRotation` by `MeshView::bulgeStrengths`. Requires
   /// `MeshView::centersOfRotation`.
-  bulgeControlled,
+  bulgeControlled = 8,
 };
 
 /// All methods, in the order of `Method`.

@@ -184,14 +184,19 @@ struct Batch {
 enum class Kernel : std::uint8_t {
   /// Converts poses to palettes: joints in the form that the skin kernel reads. These are dual
   /// quaternions, logarithms or matrices, and scale.
-  palette,
-  skin,        ///< skins instances
-  visibility,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
-  clear,       ///< clears the results of instances that are skinned
+  palette = 0,
+  skin = 1,        ///< skins instances
+  visibility = 2,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
+  clear = 3,       ///< clears the results of instances that are skinned
 };
 
 /// The four attributes of an output, in the order of the arrays below.
-enum class Stream : std::uint8_t { positions, normals, tangents, previousPositions };
+enum class Stream : std::uint8_t {
+  positions = 0,
+  normals = 1,
+  tangents = 2,
+  previousPositions = 3
+};
 inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
 /// One specialization of a kernel, from which one pipeline is built. An engine compares variants,
@@ -281,31 +286,27 @@ DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& n
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
-<<<<<<< HEAD
 /// The buffers of a batch or a scene. Poses, tables, palettes and results of a batch are rewritten
 /// in every frame: each frame in flight needs its own.
-=======
-/// The buffers of a batch or a scene. Poses, tables, palettes and results of a batch, and `upload`
-/// and `readBack` of a scene, are rewritten in every frame: each frame in flight needs its own.
->>>>>>> parent of 89e5af8 (core, vulkan, gltf: Write the value of every public enumerator)
 enum class BufferRole : std::uint8_t {
-  meshes,  ///< packed meshes
-  poses,   ///< joint matrices; in a scene, those that the CPU writes
+  meshes = 0,  ///< packed meshes
+  poses = 1,   ///< joint matrices; in a scene, those that the CPU writes
   /// What kernels read about poses and instances. In a batch `writeTables` writes it; in a scene
   /// the plan uploads it.
-  tables,
-  palettes,           ///< what the palette kernel writes: palettes and `PoseStatus`
-  results,            ///< `InstanceResult`
-  positions,          ///< skinned positions; in a scene, all attributes
-  normals,            ///< skinned normals
-  tangents,           ///< skinned tangents
-  previousPositions,  ///< positions of the previous frame
+  tables = 2,
+  palettes = 3,           ///< what the palette kernel writes: palettes and `PoseStatus`
+  results = 4,            ///< `InstanceResult`
+  positions = 5,          ///< skinned positions; in a scene, all attributes
+  normals = 6,            ///< skinned normals
+  tangents = 7,           ///< skinned tangents
+  previousPositions = 8,  ///< positions of the previous frame
   // Only in a scene (scene.h).
-  gpuPoses,    ///< joint matrices that a GPU pass of the engine writes
-  readBack,    ///< what the CPU reads of a complete frame; copied from counters and results
-  visibility,  ///< a word for each instance, not 0 if it is visible; the engine's culling writes it
-  history,     ///< what the visibility kernel remembers from frame to frame
-  counters,    ///< what the visibility kernel counts
+  gpuPoses = 9,   ///< joint matrices that a GPU pass of the engine writes
+  readBack = 10,  ///< what the CPU reads of a complete frame; copied from counters and results
+  /// A word for each instance, not 0 if it is visible. The engine's culling writes it.
+  visibility = 11,
+  history = 12,   ///< what the visibility kernel remembers from frame to frame
+  counters = 13,  ///< what the visibility kernel counts
 };
 inline constexpr std::size_t bufferRoleCount = 14;  ///< number of values of `BufferRole`
 

@@ -15,18 +15,18 @@ namespace dermis {
 
 /// The kind of an error. `Error::message` says what is wrong.
 enum class ErrorCode : std::uint8_t {
-  invalidArgument,     ///< the caller broke a rule of the function
-  invalidMesh,         ///< `validate` finds a problem that `pack` refuses; `repair` may help
-  invalidData,         ///< a blob or file is damaged, truncated, or breaks the rules of its format
-  unsupportedVersion,  ///< a blob is from another version of Dermis
-  unsupportedFeature,  ///< a file needs a feature that Dermis does not implement
-  limitExceeded,       ///< more than the device, or a type of the interface, can hold
-  notPrepared,         ///< `record` needs a pipeline that `prepare` has not built
-  missingEntryPoint,   ///< the driver does not have a function, or it was not enabled
-  missingFeature,      ///< the device, or this build of Dermis, lacks a feature
-  vulkanError,         ///< a Vulkan function failed; `Error::vulkanResult` is what it returned
-  shaderError,         ///< GLSL does not compile, or SPIR-V is not valid
-  ioError,             ///< a file cannot be opened, read or written
+  invalidArgument = 0,  ///< the caller broke a rule of the function
+  invalidMesh = 1,      ///< `validate` finds a problem that `pack` refuses; `repair` may help
+  invalidData = 2,      ///< a blob or file is damaged, truncated, or breaks the rules of its format
+  unsupportedVersion = 3,  ///< a blob is from another version of Dermis
+  unsupportedFeature = 4,  ///< a file needs a feature that Dermis does not implement
+  limitExceeded = 5,       ///< more than the device, or a type of the interface, can hold
+  notPrepared = 6,         ///< `record` needs a pipeline that `prepare` has not built
+  missingEntryPoint = 7,   ///< the driver does not have a function, or it was not enabled
+  missingFeature = 8,      ///< the device, or this build of Dermis, lacks a feature
+  vulkanError = 9,         ///< a Vulkan function failed; `Error::vulkanResult` is what it returned
+  shaderError = 10,        ///< GLSL does not compile, or SPIR-V is not valid
+  ioError = 11,            ///< a file cannot be opened, read or written
 };
 
 /// The name of a code as it is written above, for logs.

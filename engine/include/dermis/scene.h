@@ -64,8 +64,8 @@ struct SceneDescription {
 
 /// Who writes the joint matrices of a pose.
 enum class PoseWriter : std::uint8_t {
-  cpu,  ///< the CPU, to memory that `writePose` returns in each frame
-  gpu,  ///< a GPU pass of the engine, always to the same memory; the engine calls `markWritten`
+  cpu = 0,  ///< the CPU, to memory that `writePose` returns in each frame
+  gpu = 1,  ///< a GPU pass of the engine, always to the same memory; the engine calls `markWritten`
 };
 
 /// What is fixed when a pose is added.

@@ -15,7 +15,7 @@
 namespace dermis {
 
 /// The kind of a shader.
-enum class ShaderStage : std::uint8_t { compute, vertex, fragment };
+enum class ShaderStage : std::uint8_t { compute = 0, vertex = 1, fragment = 2 };
 
 /// How shaders are compiled.
 struct ShaderCompilerOptions {

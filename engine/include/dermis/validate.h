@@ -15,33 +15,34 @@ namespace dermis {
 /// the others.
 enum class MeshProblem : std::uint8_t {
   // The views are not valid. `repair` cannot help.
-  emptyMesh,        ///< no vertices, or no positions
-  noInfluenceSets,  ///< no influences, or a set without joints or weights
-  countMismatch,    ///< the count of an attribute is not what `AttributeView::count` must be
-  strideTooSmall,   ///< the stride of an attribute is less than the size of an element
-  wrongFormat,      ///< an attribute has a component type or count that is not allowed
-  morphVertices,    ///< vertices of a morph target are not ascending, or are outside the mesh
+  emptyMesh = 0,        ///< no vertices, or no positions
+  noInfluenceSets = 1,  ///< no influences, or a set without joints or weights
+  countMismatch = 2,    ///< the count of an attribute is not what `AttributeView::count` must be
+  strideTooSmall = 3,   ///< the stride of an attribute is less than the size of an element
+  wrongFormat = 4,      ///< an attribute has a component type or count that is not allowed
+  morphVertices = 5,    ///< vertices of a morph target are not ascending, or are outside the mesh
   // Values that `pack` refuses and `repair` fixes.
-  nonFinitePosition,
-  nonFiniteNormal,
-  nonFiniteTangent,
-  nonFiniteMorph,   ///< a displacement of a morph target
-  nonFiniteCenter,  ///< a center of rotation
+  nonFinitePosition = 6,
+  nonFiniteNormal = 7,
+  nonFiniteTangent = 8,
+  nonFiniteMorph = 9,    ///< a displacement of a morph target
+  nonFiniteCenter = 10,  ///< a center of rotation
   /// A dual-quaternion weight or bulge strength that is not from 0 to 1.
-  methodWeightOutOfRange,
-  nonFiniteWeight,  ///< NaN or infinite
-  negativeWeight,
+  methodWeightOutOfRange = 11,
+  nonFiniteWeight = 12,  ///< NaN or infinite
+  negativeWeight = 13,
   /// A joint that the pose does not have, or a float that is not a whole number, with a weight that
   /// is not 0.
-  jointOutOfRange,
+  jointOutOfRange = 14,
   // Values that `pack` fixes or ignores, and lengths that do not matter to skinning.
-  weightsNotNormalized,   ///< the weights of a vertex do not sum to 1: they are normalized
-  duplicateJoint,         ///< a joint occurs twice in a vertex: its weights are added
-  vertexWithoutWeight,    ///< all weights are 0: the vertex stays in bind pose
-  unusedJointOutOfRange,  ///< a joint that the pose does not have, with weight 0: it is ignored
-  normalLength,           ///< a normal is not of unit length
-  tangentLength,          ///< a tangent is not of unit length
-  tangentSign,            ///< the handedness of a tangent is neither 1 nor -1
+  weightsNotNormalized = 15,  ///< the weights of a vertex do not sum to 1: they are normalized
+  duplicateJoint = 16,        ///< a joint occurs twice in a vertex: its weights are added
+  vertexWithoutWeight = 17,   ///< all weights are 0: the vertex stays in bind pose
+  /// As `jointOutOfRange`, but with weight 0: the joint is ignored.
+  unusedJointOutOfRange = 18,
+  normalLength = 19,   ///< a normal is not of unit length
+  tangentLength = 20,  ///< a tangent is not of unit length
+  tangentSign = 21,    ///< the handedness of a tangent is neither 1 nor -1
 };
 
 /// One kind of problem in one mesh.

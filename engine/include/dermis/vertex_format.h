@@ -25,17 +25,17 @@ namespace dermis {
 ///   32767 be the maximum integer. y is stored as q = 1 + round((y + 1) / 2 · (L - 1)), from 1 to
 ///   L, and q is negated if the handedness is -1. To decode: y = 2 (|q| - 1) / (L - 1) - 1.
 enum class VertexFormat : std::uint8_t {
-  none,  ///< the attribute is not written
-  float32x3,
-  float32x4,
-  float16x3,
-  float16x4,
-  snorm16x3,
-  snorm16x4,
-  snorm8x3,  ///< `cpu::skin` only: no run with it is whole words (`OutputAttribute`)
-  snorm8x4,
-  octahedral16x2,
-  octahedral8x2,
+  none = 0,  ///< the attribute is not written
+  float32x3 = 1,
+  float32x4 = 2,
+  float16x3 = 3,
+  float16x4 = 4,
+  snorm16x3 = 5,
+  snorm16x4 = 6,
+  snorm8x3 = 7,  ///< `cpu::skin` only: no run with it is whole words (`OutputAttribute`)
+  snorm8x4 = 8,
+  octahedral16x2 = 9,
+  octahedral8x2 = 10,
 };
 
 /// All formats except `none`.
