@@ -388,7 +388,7 @@ TEST_F(SystemHandlesTest, WhatWasNotPreparedIsTriedAgain) {
   instance.pose = unprepared.addPose(systemPose(2));
   const InstanceHandle handle = must(unprepared->addInstance(instance));
   expectRefused(unprepared.trySubmit(), ErrorCode::notPrepared,
-                "call Context::prepare for it first");
+                "call SceneRecorder::prepare for it first");
   must(unprepared.recorder().prepare(instance));
   unprepared.runFrame();
   EXPECT_EQ(unprepared.lastFrame().skinnedInstances, 1u);

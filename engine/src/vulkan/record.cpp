@@ -117,15 +117,15 @@ Result<void> BindingsState::check(const Plan& plan) const {
         "the plan was made for the limits of another device; pass Context::limits() to makePlan"};
   }
   if (Result<void> good = checkOneBuffer(plan); !good) return good;
-  return context->check(plan, bound, sets);
+  return context->check(plan, bound, sets, "Context::prepare");
 }
 
 Result<void> ContextState::check(const Plan& plan, const BoundBuffers& buffers,
-                                 DescriptorSets& sets) const {
+                                 DescriptorSets& sets, const char* prepare) const {
   for (const Variant& variant : plan.variants()) {
     if (pipelines->find(variant) == VK_NULL_HANDLE)
       return Error{ErrorCode::notPrepared,
-                   describe(variant) + " has no pipeline; call Context::prepare for it first"};
+                   describe(variant) + " has no pipeline; call " + prepare + " for it first"};
   }
   if (pushesDescriptors()) return {};
   for (const Command& command : plan.commands()) {

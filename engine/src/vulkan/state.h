@@ -46,10 +46,10 @@ struct ContextState {
   Result<void> createLayouts();
   Result<void> prepare(std::span<const Variant> variants) const;
   Result<void> prepare(const PipelineNeeds& needs, const Tuning& withTuning) const;
-  /// Whether there is a pipeline for each dispatch. Without push descriptors it also makes their
-  /// sets.
+  /// Whether there is a pipeline for each dispatch; else the error names the function `prepare`,
+  /// which builds them. Without push descriptors it also makes their sets.
   Result<void> check(const Plan& plan, const std::vector<BoundBuffer>& buffers,
-                     DescriptorSets& sets) const;
+                     DescriptorSets& sets, const char* prepare) const;
 
   VkInstance instance;
   PFN_vkGetInstanceProcAddr getInstanceProcAddr;

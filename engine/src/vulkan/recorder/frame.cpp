@@ -56,7 +56,8 @@ Result<void> SceneRecorder::State::recordFrame(VkCommandBuffer commandBuffer,
                                    scene->visibilityCount() * VkDeviceSize{4}};
   FrameSlot& own = slot();
   own.sets.reset();
-  if (Result<void> good = context->check(plan, bound, own.sets); !good) return good;
+  if (Result<void> good = context->check(plan, bound, own.sets, "SceneRecorder::prepare"); !good)
+    return good;
   if (Result<void> made = makeStaging(); !made) return made;
   const double planSeconds = planning.seconds();
 
