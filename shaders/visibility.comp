@@ -106,7 +106,7 @@ void countWorkgroups(uint word, uint arguments) {
   }
   uint maxWorkgroups = push.maxWorkgroups;
   // `maxWorkgroups` may be 2³² − 1, so adding it before the division could overflow. Workgroups and rows are at most 2³¹ each, so
-  // adding these cannot (PlanBuilder::addDispatch).
+  // adding these cannot (Encoder::addDispatch).
   uint rows = workgroups / maxWorkgroups + (workgroups % maxWorkgroups != 0u ? 1u : 0u);
   storeIndirect(arguments, IndirectRecord(rows == 0u ? 0u : (workgroups + rows - 1u) / rows, rows, 1u, 0u));
   atomicAdd(counters.workgroups, workgroups);

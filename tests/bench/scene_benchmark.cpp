@@ -8,7 +8,7 @@
 #include <map>
 #include <vector>
 
-#include "dermis/scene.h"
+#include "planned_scene.h"
 
 namespace dermis::bench {
 namespace {
@@ -23,7 +23,7 @@ struct Crowd {
     info.requiredJoints = jointCount;
     info.maxInfluences = 4;
     info.byteSize = 1 << 16;
-    const MeshHandle mesh = *scene.addMesh(info);
+    const MeshHandle mesh = *planned.addMesh(info);
     for (std::uint32_t i = 0; i < count; ++i) {
       poses.push_back(*scene.addPose(jointCount));
       InstanceDescription description;
@@ -33,23 +33,23 @@ struct Crowd {
     }
     runFrame();
   }
-  static SceneDescription description() {
-    SceneDescription description;
-    description.jointCapacity = Capacity::fixed(10'000 * jointCount);
-    description.instanceCapacity = Capacity::fixed(10'000);
-    description.outputCapacity = Capacity::fixed(std::uint64_t{10'000} * 1000 * 12);
+  static SceneCommandsDescription description() {
+    SceneCommandsDescription description;
+    description.scene.jointCapacity = Capacity::fixed(10'000 * jointCount);
+    description.scene.instanceCapacity = Capacity::fixed(10'000);
+    description.scene.outputCapacity = Capacity::fixed(std::uint64_t{10'000} * 1000 * 12);
     description.limits.maxStorageBufferRange = 1u << 30;
     return description;
   }
   void runFrame() {
     ++frame;
-    if (!scene.beginFrame(frame, frame - 1) || !scene.plan(plan) || !scene.commit()) std::abort();
+    if (!scene.beginFrame(frame, frame - 1) || !planned.plan() || !planned.commit()) std::abort();
   }
 
-  Scene scene = *Scene::create(description());
+  test::PlannedScene planned{description()};
+  Scene& scene = planned.scene();
   std::vector<PoseHandle> poses;
   std::vector<InstanceHandle> instances;
-  Plan plan;
   std::uint64_t frame = 0;
 };
 
@@ -93,7 +93,7 @@ void planFrames(benchmark::State& state, bool moves) {
       if (moves && !crowd.scene.writePose(pose)) std::abort();
     }
     state.ResumeTiming();
-    if (!crowd.scene.plan(crowd.plan) || !crowd.scene.commit())
+    if (!crowd.planned.plan() || !crowd.planned.commit())
       return state.SkipWithError("a plan failed");
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));
@@ -114,14 +114,14 @@ struct Gaps {
     for (const InstanceHandle hole : holes) {
       if (!scene.removeInstance(hole)) std::abort();
     }
-    if (!scene.beginFrame(1, 0) || !scene.plan(plan) || !scene.commit() || !scene.beginFrame(2, 1))
+    if (!scene.beginFrame(1, 0) || !planned.plan() || !planned.commit() || !scene.beginFrame(2, 1))
       std::abort();
   }
-  static SceneDescription description() {
-    SceneDescription description;
-    description.meshCapacity = Capacity::fixed(1 << 20);
-    description.instanceCapacity = Capacity::fixed(400'000);
-    description.outputCapacity = Capacity::fixed(std::uint64_t{1} << 26);
+  static SceneCommandsDescription description() {
+    SceneCommandsDescription description;
+    description.scene.meshCapacity = Capacity::fixed(1 << 20);
+    description.scene.instanceCapacity = Capacity::fixed(400'000);
+    description.scene.outputCapacity = Capacity::fixed(std::uint64_t{1} << 26);
     description.limits.maxStorageBufferRange = 1u << 30;
     return description;
   }
@@ -131,7 +131,7 @@ struct Gaps {
     info.vertexCount = vertexCount;
     info.requiredJoints = info.maxInfluences = 1;
     info.byteSize = 1024;
-    if (!mesh) mesh = *scene.addMesh(info);
+    if (!mesh) mesh = *planned.addMesh(info);
     return mesh;
   }
   InstanceHandle add(std::uint32_t vertexCount) {
@@ -139,10 +139,10 @@ struct Gaps {
     return *scene.addInstance(instance);
   }
 
-  Scene scene = *Scene::create(description());
+  test::PlannedScene planned{description()};
+  Scene& scene = planned.scene();
   std::map<std::uint32_t, MeshHandle> meshes;
   InstanceDescription instance;
-  Plan plan;
 };
 
 /// No instance fits a gap before it. But for two, they are a little larger than every gap, and

@@ -5,7 +5,7 @@
 
 namespace dermis::vulkan {
 
-/// For `SkinningSystemDescription::buffers`. The allocator must outlive the system. For buffers
+/// For `SceneRecorderDescription::buffers`. The allocator must outlive the recorder. For buffers
 /// with device addresses, it needs VMA_ALLOCATOR_CREATE_BUFFER_DEVICE_ADDRESS_BIT.
 inline BufferCallbacks vmaBufferCallbacks(VmaAllocator allocator) {
   const auto create = [](void* user, const BufferRequest& request) -> Result<CreatedBuffer> {
