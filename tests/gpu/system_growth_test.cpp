@@ -122,7 +122,7 @@ TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
   SceneRecorderDescription system = tiny();
   system.scene.framesInFlight = 3;
   SystemEngine engine(device(), withSets, system);
-  const PackedMesh mesh = systemMesh(1, 100);
+  const PackedMesh mesh = systemMesh(1, 400);
   InstanceDescription instance;
   instance.layout = motionLayout();
   instance.bounds = true;

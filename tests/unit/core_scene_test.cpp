@@ -355,13 +355,14 @@ TEST(Scene, DoesWithAnInstanceWhatTheTablesSay) {
     const Action action = actionFor(view, need, isOnBeat);
     return action == Action::settle && !isMoving ? Action::leave : action;
   };
-  for (int choice = 0; choice < 64; ++choice) {
+  for (int choice = 0; choice < 128; ++choice) {
     const auto view = static_cast<View>(choice % 4);
     const auto need = static_cast<Need>(choice / 4 % 4);
     bool isMoving = choice / 16 % 2 != 0;
-    const bool isOnBeat = choice / 32 != 0;
+    const bool isOnBeat = choice / 32 % 2 != 0, hasDetour = choice / 64 != 0;
     SCOPED_TRACE("view " + std::to_string(choice % 4) + ", need " + std::to_string(choice / 4 % 4) +
-                 (isMoving ? ", moving" : "") + (isOnBeat ? "" : ", not on the beat"));
+                 (isMoving ? ", moving" : "") + (isOnBeat ? "" : ", not on the beat") +
+                 (hasDetour ? ", changed and changed back" : ""));
     OneInstance one;
     must(one.scene.removeInstance(one.instance));
     one.description.bounds = false;
@@ -389,6 +390,10 @@ TEST(Scene, DoesWithAnInstanceWhatTheTablesSay) {
       EXPECT_EQ(actionOf(one.owner), Action::leave);
     }
     if (view == View::returning) show(true);
+    if (hasDetour) {
+      show(!isDisplayed(view));
+      show(isDisplayed(view));
+    }
     begin();
     if (!isOnBeat) wait(100'000);
     if (need == Need::stale) must(one.scene.writePose(one.pose));
@@ -583,6 +588,16 @@ TEST(Scene, NothingIsDueBetweenFrames) {
   EXPECT_FALSE(*one.scene.isDue(one.instance));
 }
 
+TEST(Scene, WhatWasDueInAFrameThatWasSkippedIsDueInTheNext) {
+  OneInstance one;
+  must(one.scene.change({.instance = one.instance, .updateInterval = 10u}));
+  one.record(8, 0);
+  must(one.scene.beginFrame(9, 8));
+  EXPECT_FALSE(must(one.scene.isDue(one.instance)));
+  must(one.scene.beginFrame(12, 8));
+  EXPECT_TRUE(must(one.scene.isDue(one.instance))) << "in frame 10";
+}
+
 TEST(Scene, AMeshWithOtherTargetsTakesNoMorphWeights) {
   OneInstance one;
   std::vector<MeshHandle> meshes;
@@ -660,6 +675,9 @@ TEST(Scene, PalettesGrowToAStorageBufferRange) {
   description.scene.meshCapacity = Capacity::fixed(512);
   description.scene.jointCapacity = {4};
   PlannedScene owner(description);
+  EXPECT_EQ(owner.sizeOf(BufferRole::palettes),
+            (4 + description.scene.gpuJointCapacity.initial) * 5 * 16)
+      << "what the first joints need";
   MeshInfo info;
   info.byteSize = 512;
   info.vertexCount = info.requiredJoints = info.maxInfluences = 1;

@@ -110,7 +110,7 @@ bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimit
          limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
          (job.method == Method::linear || job.method == Method::dualQuaternion) &&
          job.motion == Motion::none && !hasResult(job) && isRecord(job) &&
-         job.positions.stride == recordSize(job) && job.positions.offset % 4 == 0 &&
+         job.positions.stride == recordSize(job) &&
          (recordSize(job) == streams[0].size || standsTogether(streams));
 }
 
