@@ -1,6 +1,8 @@
 // A scene whose buffers are only counted: for tests of what its frames list.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <functional>
