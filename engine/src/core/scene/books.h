@@ -122,7 +122,8 @@ struct Place {
 struct InstanceState {
   std::uint32_t generation = 0;  ///< of its handle; 0: there is none
   std::uint32_t updateInterval = 1;
-  View view = View::shown;
+  std::uint32_t turned = 0;  ///< the record, modulo 2³², after which `view` changed last
+  View view = View::shown;   ///< then; `viewOf` tells what has become of it
   Need need = Need::restart;
   bool isListed = false;  ///< among the pending
   bool isCulled = false;
@@ -287,9 +288,13 @@ struct SceneBooks {
   void addDue(std::uint32_t index, bool restarts);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
   bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
+  View viewOf(const InstanceState& state) const {
+    const bool isExecuted = state.turned != static_cast<std::uint32_t>(record_);
+    return isExecuted ? after(state.view, ViewEvent::execute) : state.view;
+  }
   /// What the next frame does with it, if `need` is what is out of date.
   Action actionOf(const InstanceState& state, std::uint32_t pose, Need need) const {
-    return actionFor(state.view, need,
+    return actionFor(viewOf(state), need,
                      state.updateInterval == 1 || isOnBeat(state.updateInterval, pose));
   }
   void convertPalette(const SceneInstance& instance);
@@ -339,9 +344,8 @@ struct SceneBooks {
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
   std::vector<InstanceHandle> shifting_;  ///< `target` is not `shown`
   std::vector<std::uint32_t> culled_;     ///< all that are culled on the GPU
-  std::vector<InstanceHandle> turning_;  ///< leaving or returning; some more than once or no longer
-  std::vector<InstanceHandle> moving_;   ///< to settle if they are in view and not skinned; some
-                                         ///< more than once
+  std::vector<InstanceHandle> moving_;    ///< to settle if they are in view and not skinned; some
+                                          ///< more than once
 
   // Of the plan.
   bool isPlanned_ = false;

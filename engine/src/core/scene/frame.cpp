@@ -332,11 +332,6 @@ Result<void> SceneBooks::commit() {
   }
   std::erase_if(pending_,
                 [this](InstanceHandle handle) { return states_[handle.index].need == Need::none; });
-  for (const InstanceHandle handle : turning_) {
-    if (InstanceState* const state = findState(handle))
-      state->view = after(state->view, ViewEvent::execute);
-  }
-  turning_.clear();
   for (const std::uint32_t index : settling_) {
     states_[index].isMoving = false;
     settled_.push_back(instances_.handleOf(index));
@@ -381,7 +376,6 @@ void SceneBooks::abandon() {
     instances_.at(index).version = 0;
     raise(index, Need::restart);
   }
-  turning_.clear();
   for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
     for (ScenePose::Form& form : poses_.at(index).forms) form.version = 0;
   }

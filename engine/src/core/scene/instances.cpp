@@ -384,10 +384,11 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
 }
 
 void SceneBooks::setView(InstanceState& state, InstanceHandle handle, bool isVisible) {
-  const View view = after(state.view, isVisible ? ViewEvent::show : ViewEvent::hide);
-  if (view == state.view) return;
+  const View before = viewOf(state);
+  const View view = after(before, isVisible ? ViewEvent::show : ViewEvent::hide);
+  if (view == before) return;
   state.view = view;
-  if (view == View::leaving || view == View::returning) turning_.push_back(handle);
+  state.turned = static_cast<std::uint32_t>(record_);
   if (!isVisible) return;
   if (state.isMoving) moving_.push_back(handle);
   if (state.need != Need::none) makePending(state, handle.index);
