@@ -199,7 +199,6 @@ struct SceneBooks {
   Result<void> setMorphWeights(InstanceHandle handle, std::span<const MorphWeight> morphs);
   Result<void> changeSkinning(const InstanceChange& change);
   void changeState(InstanceState& state, const InstanceChange& change);
-  void setView(InstanceState& state, InstanceHandle handle, bool isVisible);
   void shift(InstanceHandle handle);
 
   void raise(std::uint32_t index, Need need) {
@@ -211,6 +210,11 @@ struct SceneBooks {
     if (state.isListed || !isDisplayed(state.view) || state.isCulled) return;
     state.isListed = true;
     pending_.push_back({index, state.generation});
+  }
+  /// It is shown again.
+  void comeBack(InstanceState& state, InstanceHandle handle) {
+    if (state.isMoving) moving_.push_back(handle);
+    if (state.need != Need::none) makePending(state, handle.index);
   }
   /// Null if there is no instance with this handle.
   InstanceState* findState(InstanceHandle handle) {
@@ -288,13 +292,23 @@ struct SceneBooks {
   void addDue(std::uint32_t index, bool restarts);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
   bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
-  View viewOf(const InstanceState& state) const {
-    const bool isExecuted = state.turned != static_cast<std::uint32_t>(record_);
-    return isExecuted ? after(state.view, ViewEvent::execute) : state.view;
+  /// After record number `record`, modulo 2³².
+  static View viewOf(const InstanceState& state, std::uint32_t record) {
+    return state.turned == record ? state.view : after(state.view, ViewEvent::execute);
   }
+  /// Whether the view has changed.
+  static bool turn(InstanceState& state, std::uint32_t record, bool isVisible) {
+    const View before = viewOf(state, record);
+    const View view = after(before, isVisible ? ViewEvent::show : ViewEvent::hide);
+    if (view == before) return false;
+    state.view = view;
+    state.turned = record;
+    return true;
+  }
+  std::uint32_t recordNumber() const { return static_cast<std::uint32_t>(record_); }
   /// What the next frame does with it, if `need` is what is out of date.
   Action actionOf(const InstanceState& state, std::uint32_t pose, Need need) const {
-    return actionFor(viewOf(state), need,
+    return actionFor(viewOf(state, recordNumber()), need,
                      state.updateInterval == 1 || isOnBeat(state.updateInterval, pose));
   }
   void convertPalette(const SceneInstance& instance);

@@ -383,17 +383,6 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
   return {};
 }
 
-void SceneBooks::setView(InstanceState& state, InstanceHandle handle, bool isVisible) {
-  const View before = viewOf(state);
-  const View view = after(before, isVisible ? ViewEvent::show : ViewEvent::hide);
-  if (view == before) return;
-  state.view = view;
-  state.turned = static_cast<std::uint32_t>(record_);
-  if (!isVisible) return;
-  if (state.isMoving) moving_.push_back(handle);
-  if (state.need != Need::none) makePending(state, handle.index);
-}
-
 /// Changes that affect the kernel, the inputs or the output of the instance.
 Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
   SceneInstance& instance = instances_.at(change.instance.index);
@@ -410,7 +399,8 @@ Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
 /// All other changes, which cannot fail.
 void SceneBooks::changeState(InstanceState& state, const InstanceChange& change) {
   if (change.updateInterval) state.updateInterval = *change.updateInterval;
-  if (change.visible) setView(state, change.instance, *change.visible);
+  if (change.visible && turn(state, recordNumber(), *change.visible) && *change.visible)
+    comeBack(state, change.instance);
   if (change.teleports) raise(change.instance.index, Need::restart);
 }
 
@@ -444,8 +434,9 @@ Result<void> Scene::change(std::span<const InstanceChange> changes) {
 
 Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances) {
   SceneBooks& books = changed();
-  // A local copy, so that the compiler knows that stores to a state do not change it.
+  // Local copies, so that the compiler knows that stores to a state do not change them.
   const std::span<InstanceState> states = books.states_;
+  const std::uint32_t record = books.recordNumber();
   for (const InstanceVisibility& wanted : instances) {
     const InstanceHandle handle = wanted.instance;
     const bool isKnown = handle.index < states.size() && handle &&
@@ -458,7 +449,8 @@ Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances)
     }
     InstanceState& state = states[handle.index];
     state.updateInterval = wanted.updateInterval;
-    if (isDisplayed(state.view) != wanted.visible) books.setView(state, handle, wanted.visible);
+    if (SceneBooks::turn(state, record, wanted.visible) && wanted.visible)
+      books.comeBack(state, handle);
   }
   return {};
 }

@@ -254,11 +254,13 @@ Result<void> SceneBooks::makeFrameBuffers(const PlanData& plan) {
       return made;
   }
   const bool culls = !work_.culled.empty();
-  if (const BufferRequirement needed = sizes().requirement(BufferRole::history, 0, limits_);
-      culls && history_.now.size < needed.size) {
-    const Result<SceneBufferMemory> made = create(BufferRole::history, needed);
-    if (!made) return made.error();
-    replace(history_, *made);
+  if (culls) {
+    const BufferRequirement needed = sizes().requirement(BufferRole::history, 0, limits_);
+    if (history_.now.size < needed.size) {
+      const Result<SceneBufferMemory> made = create(BufferRole::history, needed);
+      if (!made) return made.error();
+      replace(history_, *made);
+    }
   }
   if (culls && !counters_.exists()) {
     if (Result<void> made = make(counters_, BufferRole::counters,
@@ -266,11 +268,10 @@ Result<void> SceneBooks::makeFrameBuffers(const PlanData& plan) {
         !made)
       return made;
   }
+  if (!culls && resultCopies_.empty()) return {};
   SceneBufferMemory& back = nextReadBack().buffer;  // the frame that used it last is complete
   const BufferRequirement needed = sizes().requirement(BufferRole::readBack, 0, limits_);
-  if ((culls || !resultCopies_.empty()) && back.size < needed.size)
-    return make(back, BufferRole::readBack, needed);
-  return {};
+  return back.size < needed.size ? make(back, BufferRole::readBack, needed) : Result<void>();
 }
 
 /// What the next frame uses.
