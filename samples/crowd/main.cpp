@@ -172,7 +172,7 @@ vulkan::SceneRecorder createOnDevice(const vulkan::Context& context, const Chara
 }
 // [/crowd-set-up]
 
-/// The figures of a scene, whoever executes its frames.
+/// The figures of a scene, on a device or on the CPU.
 class Crowd {
  public:
   Crowd(Scene& scene, const Character& character, const Options& options)

@@ -1,4 +1,4 @@
-// An engine with a rendering hardware interface (RHI) of its own: it executes the commands of a
+// An engine with its own rendering hardware interface (RHI): it executes the commands of a
 // scene, and creates all objects and buffers itself. Of dermis::vulkan it uses the kernels only.
 // Half of the figures are culled on the GPU. At the end it checks every vertex and every box.
 //
@@ -441,7 +441,7 @@ int main() {
     const InstanceOutput place = must(scene.output(figures[number]));
     const std::byte* vertices = output + place.offset;
     const std::optional<Box> box = must(scene.bounds(figures[number]));
-    if (number == 3) {  // nobody saw it
+    if (number == 3) {  // it was never visible
       right += !box.has_value();
       continue;
     }

@@ -206,7 +206,7 @@ class DERMIS_CORE_API Scene {
   //
   // Adding something may make a buffer grow. The larger buffer is created at once, for twice the
   // size, or for the minimum if there is no memory for that. If there is no memory for the minimum
-  // either, the function fails with the error of whoever creates buffers, and adds nothing. The
+  // either, the function fails with the error of the creation, and adds nothing. The
   // next frame copies the contents of the old buffer, which is released once the frames that use it
   // are complete.
 

@@ -41,7 +41,7 @@ enum class Need : std::uint8_t {
   none,     ///< nothing
   stale,    ///< they are those of another pose or other morph weights
   urgent,   ///< of another pose object or method: skinned whatever the update interval is
-  restart,  ///< they cannot be compared with what comes: the instance is new, teleports, has
+  restart,  ///< they cannot be compared with the next ones: the instance is new, teleports, has
             ///< another mesh or box, or its last frame was abandoned
 };
 
