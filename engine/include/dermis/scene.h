@@ -185,7 +185,7 @@ struct SceneStatistics {
   StoreStatistics meshes, palettes, outputs;  ///< memory now
 };
 
-class SceneBooks;
+struct SceneBooks;
 
 /// Meshes, poses and instances, and where their vertices are. Not thread-safe: one thread at a time
 /// may call a member function, or a function of the owner that executes a frame. A scene stays at
