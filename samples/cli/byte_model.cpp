@@ -9,7 +9,9 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "abi.h"
 #include "dermis/layout.h"
+#include "dermis/plan.h"
 #include "kernel_instructions.h"
 
 namespace dermis::cli {
@@ -108,13 +110,17 @@ struct Layout {
 
 /// Bytes of the sectors that a subgroup's stores touch, per vertex. If each store writes some bytes
 /// of every record, it touches all sectors of all records.
-double storedBytes(const Variant& variant, double stride) {
-  if (variant.staged) return stride;
+double storedBytes(const Layout& layout, const vulkan::PipelineDescription& pipeline,
+                   double stride) {
+  const std::uint32_t recordBytes = pipeline.constants[abi::CONSTANT_RECORD];
+  if (pipeline.module.ends_with("_staged")) return stride;
+  if (recordBytes != 0 && recordBytes != abi::RECORD_IN_PAIRS)
+    return std::max(recordBytes / 16.0, 1.0) * std::min(stride, sector);
   double stores = 0;
-  const std::array formats{variant.positions, variant.normals, variant.tangents};
+  const std::uint32_t wide = pipeline.constants[abi::CONSTANT_WIDE];
+  const std::array formats{layout.positions, layout.normals};
   for (std::size_t stream = 0; stream < formats.size(); ++stream)
-    stores += variant.wide[stream] ? 1 : formatSize(formats[stream]) / 4.0;
-  if (variant.recordBytes != 0) stores = std::max(variant.recordBytes / 16.0, 1.0);
+    stores += (wide >> stream & 1) != 0 ? 1 : formatSize(formats[stream]) / 4.0;
   return stores * std::min(stride, sector);
 }
 
@@ -129,20 +135,21 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   needs.mesh->minInfluences = needs.mesh->maxInfluences = influences;
   Tuning tuning;
   tuning.instancesPerInvocation = instancesEach;
-  const Result<std::vector<Variant>> variants = everyVariant(needs, limits, tuning);
-  if (!variants) return std::nullopt;
-  const Variant& variant = variants->back();
-  const std::vector<std::uint32_t> spirv = specializedSpirv(variant, limits);
+  const Result<std::vector<PipelineId>> all = pipelines(needs, limits, tuning);
+  if (!all) return std::nullopt;
+  const Result<vulkan::PipelineDescription> pipeline = vulkan::pipelineDescription(all->back());
+  if (!pipeline) return std::nullopt;
+  const std::vector<std::uint32_t> spirv = specializedSpirv(*pipeline);
   if (spirv.empty()) return std::nullopt;
   ByteModel model;
   model.name = fmt::format("{}, {}, {}", methodName(method), layout.name, way);
   model.written = formatSize(layout.positions) + formatSize(layout.normals);
-  model.stored = storedBytes(variant, model.written);
+  model.stored = storedBytes(layout, *pipeline, model.written);
   // Positions and normals have 16 bytes each, an influence has 8.
   model.meshRead =
       (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
   model.paletteRead = influences * (method == Method::linear ? 48 : 32);
-  const Operations operations = countOperations(spirv, variant.texels ? 3 : 1);
+  const Operations operations = countOperations(spirv, pipeline->texelBuffers != 0 ? 3 : 1);
   model.operations = operations.all;
   model.fusedOperations = operations.fused;
   return model;

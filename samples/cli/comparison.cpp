@@ -12,6 +12,7 @@
 
 #include "dermis/cpu/skin.h"
 #include "dermis/verify/reference.h"
+#include "dermis/vulkan/kernels.h"
 #include "kernel_instructions.h"
 #include "kit/timed_batches.h"
 #include "scene_skinner.h"
@@ -85,18 +86,19 @@ double medianOf(std::vector<double> values) {
 }
 
 /// The skin kernel that does most of a plan's work.
-Variant mainVariant(const Plan& plan) {
-  Variant variant;
+Result<vulkan::PipelineDescription> mainPipeline(const Plan& plan) {
+  Result<vulkan::PipelineDescription> main =
+      Error{ErrorCode::invalidArgument, "the plan skins nothing"};
   std::uint32_t most = 0;
   for (const Command& command : plan.commands()) {
     const auto* dispatch = std::get_if<DispatchCommand>(&command);
-    if (dispatch == nullptr || dispatch->variant.kernel != Kernel::skin ||
-        dispatch->workgroupCount < most)
-      continue;
+    if (dispatch == nullptr || dispatch->workgroupCount < most) continue;
+    Result<vulkan::PipelineDescription> pipeline = vulkan::pipelineDescription(dispatch->pipeline);
+    if (!pipeline || !pipeline->module.starts_with("skin")) continue;
     most = dispatch->workgroupCount;
-    variant = dispatch->variant;
+    main = std::move(pipeline);
   }
-  return variant;
+  return main;
 }
 
 std::uint32_t bytesPerJoint(Method method, bool scales) {
@@ -227,19 +229,20 @@ class MethodComparer {
         samples::TimedBatches::create(*open.device, open.context);
     if (!batches) return batches.error();
     comparison_.clock = batches->hasTimestamps() ? Clock::timestamps : Clock::submission;
-    std::vector<Variant> variants;
+    std::vector<vulkan::PipelineDescription> pipelines;
     for (const ComparedMethod& compared : comparison_.methods) {
       const Result<void> added =
           batches->add(allRequests(compared.method, *instances), {}, open.context.tuning());
       if (!added) return added.error();
-      variants.push_back(mainVariant(batches->plan(variants.size())));
+      Result<vulkan::PipelineDescription> main = mainPipeline(batches->plan(pipelines.size()));
+      if (!main) return main.error();
+      pipelines.push_back(std::move(*main));
       step_();
     }
     if (Result<void> timed = repeat([&](std::size_t method) { return batches->skin(method); });
         !timed)
       return timed;
-    countInstructions(variants, open.context.limits(),
-                      PipelineStatistics::create(*open.device).get());
+    countInstructions(pipelines, PipelineStatistics::create(*open.device).get());
     return {};
   }
 
@@ -317,33 +320,35 @@ class MethodComparer {
   Result<void> planOnly() {
     DeviceLimits limits;
     limits.maxStorageBuffersPerStage = storageBuffersWanted;
-    std::vector<Variant> variants;
+    std::vector<vulkan::PipelineDescription> pipelines;
     for (const ComparedMethod& compared : comparison_.methods) {
       const std::vector<samples::SkinRequest> requests = allRequests(compared.method, 1);
       const samples::BatchLayout layout = samples::layOutBatch(requests, {});
       Plan plan;
       if (Result<void> planned = makePlan(layout.batch(), limits, {}, plan); !planned)
         return planned;
-      variants.push_back(mainVariant(plan));
+      Result<vulkan::PipelineDescription> main = mainPipeline(plan);
+      if (!main) return main.error();
+      pipelines.push_back(std::move(*main));
     }
-    countInstructions(variants, limits, nullptr);
+    countInstructions(pipelines, nullptr);
     return {};
   }
 
   /// Counts from the driver, if it counts the instructions of every kernel.
-  void countInstructions(const std::vector<Variant>& variants, const DeviceLimits& limits,
+  void countInstructions(const std::vector<vulkan::PipelineDescription>& pipelines,
                          const PipelineStatistics* statistics) {
     std::vector<std::optional<std::uint64_t>> counts;
     if (statistics != nullptr) {
-      for (const Variant& variant : variants)
-        counts.push_back(statistics->instructionCount(variant, limits));
+      for (const vulkan::PipelineDescription& pipeline : pipelines)
+        counts.push_back(statistics->instructionCount(pipeline));
     }
     comparison_.instructionSource = InstructionSource::driver;
     if (counts.empty() || std::ranges::any_of(counts, [](const auto& count) { return !count; })) {
       comparison_.instructionSource = InstructionSource::spirv;
       counts.clear();
-      for (const Variant& variant : variants)
-        counts.push_back(spirvInstructionCount(variant, limits));
+      for (const vulkan::PipelineDescription& pipeline : pipelines)
+        counts.push_back(spirvInstructionCount(pipeline));
     }
     for (std::size_t method = 0; method < counts.size(); ++method)
       comparison_.methods[method].instructions = counts[method];

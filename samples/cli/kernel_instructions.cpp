@@ -51,11 +51,10 @@ bool isCounted(std::uint32_t opcode) {
 
 }  // namespace
 
-std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits) {
-  const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
-  const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
+std::vector<std::uint32_t> specializedSpirv(const vulkan::PipelineDescription& pipeline) {
+  const std::vector<std::uint32_t>& constants = pipeline.constants;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> values;
-  for (std::uint32_t id = 0; id < constants.count; ++id) values[id] = {constants.values[id]};
+  for (std::uint32_t id = 0; id < constants.size(); ++id) values[id] = {constants[id]};
 
   spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_1);
   optimizer.RegisterPass(spvtools::CreateSetSpecConstantDefaultValuePass(values));
@@ -65,13 +64,13 @@ std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const Device
   spvtools::OptimizerOptions options;
   options.set_run_validator(false);
   std::vector<std::uint32_t> specialized;
-  if (!optimizer.Run(spirv.data(), spirv.size(), &specialized, options)) return {};
+  if (!optimizer.Run(pipeline.spirv.data(), pipeline.spirv.size(), &specialized, options))
+    return {};
   return specialized;
 }
 
-std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
-                                                   const DeviceLimits& limits) {
-  const std::vector<std::uint32_t> words = specializedSpirv(variant, limits);
+std::optional<std::uint64_t> spirvInstructionCount(const vulkan::PipelineDescription& pipeline) {
+  const std::vector<std::uint32_t> words = specializedSpirv(pipeline);
   constexpr std::size_t headerWords = 5;
   std::uint64_t count = 0;
   bool inFunction = false;
@@ -89,11 +88,11 @@ std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
 
 #else
 
-std::vector<std::uint32_t> specializedSpirv(const Variant&, const DeviceLimits&) {
+std::vector<std::uint32_t> specializedSpirv(const vulkan::PipelineDescription&) {
   return {};
 }
 
-std::optional<std::uint64_t> spirvInstructionCount(const Variant&, const DeviceLimits&) {
+std::optional<std::uint64_t> spirvInstructionCount(const vulkan::PipelineDescription&) {
   return std::nullopt;
 }
 
@@ -205,15 +204,15 @@ bool PipelineStatistics::createLayouts() {
   return functions_->CreatePipelineLayout(device_, &info, nullptr, &pipelineLayout_) == VK_SUCCESS;
 }
 
-VkPipeline PipelineStatistics::createPipeline(VkShaderModule module, const Variant& variant) const {
-  const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
-  std::array<VkSpecializationMapEntry, constants.values.size()> entries{};
-  for (std::uint32_t id = 0; id < constants.count; ++id) entries[id] = {id, id * 4, 4};
+VkPipeline PipelineStatistics::createPipeline(VkShaderModule module,
+                                              const std::vector<std::uint32_t>& constants) const {
+  std::vector<VkSpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < constants.size(); ++id) entries.push_back({id, id * 4, 4});
   VkSpecializationInfo specialization{};
-  specialization.mapEntryCount = constants.count;
+  specialization.mapEntryCount = static_cast<std::uint32_t>(entries.size());
   specialization.pMapEntries = entries.data();
-  specialization.dataSize = std::size_t{constants.count} * 4;
-  specialization.pData = constants.values.data();
+  specialization.dataSize = constants.size() * 4;
+  specialization.pData = constants.data();
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
   info.flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
@@ -249,20 +248,19 @@ std::optional<std::uint64_t> PipelineStatistics::readCount(VkPipeline pipeline) 
 }
 
 std::optional<std::uint64_t> PipelineStatistics::instructionCount(
-    const Variant& variant, const DeviceLimits& limits) const {
-  const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
+    const vulkan::PipelineDescription& pipeline) const {
   VkShaderModuleCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-  info.codeSize = spirv.size_bytes();
-  info.pCode = spirv.data();
+  info.codeSize = pipeline.spirv.size_bytes();
+  info.pCode = pipeline.spirv.data();
   VkShaderModule module = VK_NULL_HANDLE;
   if (functions_->CreateShaderModule(device_, &info, nullptr, &module) != VK_SUCCESS)
     return std::nullopt;
-  const VkPipeline pipeline = createPipeline(module, variant);
+  const VkPipeline created = createPipeline(module, pipeline.constants);
   functions_->DestroyShaderModule(device_, module, nullptr);
-  if (pipeline == VK_NULL_HANDLE) return std::nullopt;
-  const std::optional<std::uint64_t> count = readCount(pipeline);
-  functions_->DestroyPipeline(device_, pipeline, nullptr);
+  if (created == VK_NULL_HANDLE) return std::nullopt;
+  const std::optional<std::uint64_t> count = readCount(created);
+  functions_->DestroyPipeline(device_, created, nullptr);
   return count;
 }
 

@@ -7,20 +7,19 @@
 #include <optional>
 #include <vector>
 
-#include "dermis/plan.h"
+#include "dermis/vulkan/kernels.h"
 #include "kit/device.h"
 
 namespace dermis::cli {
 
 /// A kernel with specialized constants, all functions inlined, and dead code removed. Empty if
 /// SPIRV-Tools fail, or if the command was built without them.
-std::vector<std::uint32_t> specializedSpirv(const Variant& variant, const DeviceLimits& limits);
+std::vector<std::uint32_t> specializedSpirv(const vulkan::PipelineDescription& pipeline);
 
 /// The number of SPIR-V instructions of a kernel that calculate or access memory, after
 /// specialization and removal of dead code. A vector instruction counts once, and so do the
 /// instructions of a loop. Empty if SPIRV-Tools fail, or if the command was built without them.
-std::optional<std::uint64_t> spirvInstructionCount(const Variant& variant,
-                                                   const DeviceLimits& limits);
+std::optional<std::uint64_t> spirvInstructionCount(const vulkan::PipelineDescription& pipeline);
 
 /// Uses a second VkDevice on the same hardware, because `Device` may lack the required extension
 /// VK_KHR_pipeline_executable_properties.
@@ -35,14 +34,14 @@ class PipelineStatistics {
   /// The number of machine instructions of a kernel. The kernel must store whole words, since the
   /// second device enables no optional features for other stores. Empty if the driver does not
   /// count instructions.
-  std::optional<std::uint64_t> instructionCount(const Variant& variant,
-                                                const DeviceLimits& limits) const;
+  std::optional<std::uint64_t> instructionCount(const vulkan::PipelineDescription& pipeline) const;
 
  private:
   struct Functions;
   PipelineStatistics();
   bool createLayouts();
-  VkPipeline createPipeline(VkShaderModule module, const Variant& variant) const;
+  VkPipeline createPipeline(VkShaderModule module,
+                            const std::vector<std::uint32_t>& constants) const;
   std::optional<std::uint64_t> readCount(VkPipeline pipeline) const;
 
   std::unique_ptr<Functions> functions_;

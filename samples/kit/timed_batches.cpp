@@ -72,7 +72,7 @@ Result<void> TimedBatches::add(std::span<const SkinRequest> requests, const Outp
   if (Result<void> planned = makePlan(layout.batch(), context_->limits(), tuning, batch->plan);
       !planned)
     return planned;
-  if (Result<void> ready = context_->prepare(batch->plan.variants()); !ready) return ready;
+  if (Result<void> ready = context_->prepare(batch->plan.pipelines()); !ready) return ready;
   if (batches_.empty()) {
     if (Result<void> made = makeShared(layout, batch->plan); !made) return made;
   }

@@ -97,7 +97,7 @@ Result<BatchResult> VulkanRunner::skin() {
   if (Result<void> planned = makePlan(layout_.batch(), context_.limits(), options_.tuning, plan);
       !planned)
     return planned.error();
-  if (Result<void> ready = context_.prepare(plan.variants()); !ready) return ready.error();
+  if (Result<void> ready = context_.prepare(plan.pipelines()); !ready) return ready.error();
 
   Result<Buffers> buffers = makeBuffers(device_, plan);
   if (!buffers) return buffers.error();

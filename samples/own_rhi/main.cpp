@@ -67,8 +67,7 @@ class Rhi {
   DeviceLimits limits() const;
   Buffer createBuffer(VkDeviceSize size, VkBufferUsageFlags usage);
   void destroy(const Buffer& buffer);
-  VkPipeline build(std::span<const std::uint32_t> spirv,
-                   const vulkan::SpecializationConstants& constants);
+  VkPipeline build(const vulkan::PipelineDescription& description);
   void begin();
   void submit();
   VkDescriptorSet allocateSet();
@@ -112,7 +111,7 @@ Rhi::Rhi() {
   must(vkAllocateCommandBuffers(device, &commandInfo, &commandBuffer));
 
   // [layout]
-  // As kernels.h says: storage buffers in set 0, and push constants.
+  // Shared by all pipelines (`PipelineDescription`): storage buffers in set 0, and push constants.
   std::array<VkDescriptorSetLayoutBinding, storageBuffersWanted> slots{};
   for (std::uint32_t slot = 0; slot < slots.size(); ++slot)
     slots[slot] = {slot, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
@@ -187,18 +186,18 @@ void Rhi::destroy(const Buffer& buffer) {
   vkFreeMemory(device, buffer.memory, nullptr);
 }
 
-VkPipeline Rhi::build(std::span<const std::uint32_t> spirv,
-                      const vulkan::SpecializationConstants& constants) {
+VkPipeline Rhi::build(const vulkan::PipelineDescription& description) {
   auto moduleInfo =
       structure<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  moduleInfo.codeSize = spirv.size_bytes();
-  moduleInfo.pCode = spirv.data();
+  moduleInfo.codeSize = description.spirv.size_bytes();
+  moduleInfo.pCode = description.spirv.data();
   VkShaderModule module = VK_NULL_HANDLE;
   must(vkCreateShaderModule(device, &moduleInfo, nullptr, &module));
   std::vector<VkSpecializationMapEntry> entries;
-  for (std::uint32_t id = 0; id < constants.count; ++id) entries.push_back({id, id * 4, 4});
-  const VkSpecializationInfo specialization{
-      constants.count, entries.data(), std::size_t{constants.count} * 4, constants.values.data()};
+  const auto count = static_cast<std::uint32_t>(description.constants.size());
+  for (std::uint32_t id = 0; id < count; ++id) entries.push_back({id, id * 4, 4});
+  const VkSpecializationInfo specialization{count, entries.data(), std::size_t{count} * 4,
+                                            description.constants.data()};
   auto info =
       structure<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   info.stage = structure<VkPipelineShaderStageCreateInfo>(
@@ -247,8 +246,8 @@ VkDescriptorSet Rhi::allocateSet() {
 struct Executor {
   Rhi rhi;
   std::map<std::uint32_t, Rhi::Buffer> buffers;
-  std::map<std::uint64_t, VkPipeline> pipelines;  ///< by `Variant::key`
-  std::vector<Rhi::Buffer> staging;               ///< of the frame
+  std::map<PipelineId, VkPipeline> pipelines;
+  std::vector<Rhi::Buffer> staging;  ///< of the frame
 
   SceneMemory memory() {
     return {this,
@@ -290,7 +289,7 @@ void Executor::execute(std::span<const Command> commands) {
                 vkUpdateDescriptorSets(rhi.device, 1, &write, 0, nullptr);
               }
               vkCmdBindPipeline(to, VK_PIPELINE_BIND_POINT_COMPUTE,
-                                pipelines.at(dispatch.variant.key()));
+                                pipelines.at(dispatch.pipeline));
               vkCmdBindDescriptorSets(to, VK_PIPELINE_BIND_POINT_COMPUTE, rhi.layout, 0, 1, &set, 0,
                                       nullptr);
               vkCmdPushConstants(to, rhi.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
@@ -397,12 +396,11 @@ int main() {
   for (std::uint32_t number = 0; number < figureCount; ++number) {
     poses.push_back(figure.pose = must(scene.addPose(2)));
     figure.culledOnGpu = number % 2 == 1;
-    for (const Variant& variant : must(everyVariant(must(scene.pipelineNeeds(figure)),
-                                                    description.limits, description.tuning))) {
-      VkPipeline& pipeline = executor.pipelines[variant.key()];
+    for (const PipelineId id : must(pipelines(must(scene.pipelineNeeds(figure)), description.limits,
+                                              description.tuning))) {
+      VkPipeline& pipeline = executor.pipelines[id];
       if (pipeline == VK_NULL_HANDLE)
-        pipeline = executor.rhi.build(vulkan::kernelSpirv(variant, description.limits),
-                                      vulkan::specializationConstants(variant));
+        pipeline = executor.rhi.build(must(vulkan::pipelineDescription(id)));
     }
     figures.push_back(must(scene.addInstance(figure)));
   }

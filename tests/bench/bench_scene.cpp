@@ -51,7 +51,7 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
                        const samples::OutputLayout& output, const Tuning& tuning)
     : open_(open), layout_(samples::layOutBatch(requests, output)) {
   orStop(makePlan(layout_.batch(), open.context.limits(), tuning, plan_));
-  orStop(open.context.prepare(plan_.variants()));
+  orStop(open.context.prepare(plan_.pipelines()));
   const auto make = [&](BufferRole role) {
     const BufferRequirement requirement = plan_.buffer(role);
     return orStop(samples::MappedBuffer::create(*open.device, requirement.size, requirement.usage));

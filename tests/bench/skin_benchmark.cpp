@@ -141,7 +141,7 @@ void measurePrepare(benchmark::State& state, Method method) {
     state.PauseTiming();
     Result<vulkan::Context> context = vulkan::Context::create(benchDevice()->device->description());
     if (!context) return state.SkipWithError(context.error().message.c_str());
-    pipelines = everyVariant(needs, context->limits(), context->tuning())->size();
+    pipelines = dermis::pipelines(needs, context->limits(), context->tuning())->size();
     state.ResumeTiming();
     if (Result<void> built = context->prepare(needs); !built)
       return state.SkipWithError(built.error().message.c_str());

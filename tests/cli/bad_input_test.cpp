@@ -927,7 +927,7 @@ Result<void> useContext(const vulkan::DeviceDescription& description) {
   Plan plan;
   const Batch batch{{&pose, 1}, {&job, 1}, 4096, 4096, OutputSizes::oneBuffer(4096)};
   if (Result<void> made = makePlan(batch, context->limits(), {}, plan); !made) return made;
-  if (Result<void> done = context->prepare(plan.variants()); !done) return done;
+  if (Result<void> done = context->prepare(plan.pipelines()); !done) return done;
   const vulkan::BufferRange range{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, 4096};
   const Result<vulkan::Bindings> bindings = context->createBindings(
       {range, range, range, range, vulkan::OutputBuffers::oneBuffer(range), range});

@@ -181,7 +181,7 @@ class AccelerationStructureTest : public DeviceTest,
                                            std::uint64_t{vertexCount} * job.positions.stride);
     const Result<void> planned = makePlan(batch, context().limits(), {}, pose.plan);
     ASSERT_TRUE(planned.ok()) << planned.error().message;
-    ASSERT_TRUE(context().prepare(pose.plan.variants()).ok());
+    ASSERT_TRUE(context().prepare(pose.plan.pipelines()).ok());
     makePoseBuffers(pose);
   }
 

@@ -11,6 +11,7 @@
 
 #include "dermis/runtime_compiler.h"
 #include "kit/batch_runner.h"
+#include "plan/variant.h"
 #include "shader_folder.h"
 #include "system_test.h"
 
@@ -120,8 +121,7 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
 }
 
 TEST_F(KernelReloadTest, AFileThatIsMissingForAWhileOrOfAnotherVersionIsNotUsed) {
-  Variant palette;
-  palette.kernel = Kernel::palette;
+  const PipelineId palette = Variant{.kernel = Kernel::palette}.id();
   must(context_->prepare({&palette, 1}));
   static_cast<void>(reload());
   std::filesystem::rename(folder_->path() / "polar.glsl", folder_->path() / "polar");
@@ -142,13 +142,12 @@ TEST_F(KernelReloadTest, AFileThatIsWrittenDuringItsFirstCompilationIsReadAgain)
   const auto now = fs::file_time_type::clock::now();
   for (const auto& file : fs::directory_iterator(folder_->path()))
     fs::last_write_time(file, now - std::chrono::hours(1));
-  Variant variant;
-  variant.kernel = Kernel::clear;
-  must(context_->prepare({&variant, 1}));
+  const PipelineId clear = Variant{.kernel = Kernel::clear}.id();
+  must(context_->prepare({&clear, 1}));
   EXPECT_EQ(reload().changed, 0u);
   fs::last_write_time(folder_->path() / "palette.comp", now + std::chrono::hours(1));
-  variant.kernel = Kernel::palette;
-  must(context_->prepare({&variant, 1}));
+  const PipelineId palette = Variant{.kernel = Kernel::palette}.id();
+  must(context_->prepare({&palette, 1}));
   EXPECT_EQ(reload().changed, 1u);
   EXPECT_EQ(reload().changed, 0u);
 }

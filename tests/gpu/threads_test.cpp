@@ -20,6 +20,7 @@
 #include "dermis/vulkan/scene_recorder.h"
 #include "intercepted_device.h"
 #include "kit/buffer.h"
+#include "plan/variant.h"
 #include "random_rig.h"
 #include "system_engine.h"
 #include "test_device.h"
@@ -179,7 +180,7 @@ TEST_F(ThreadsTest, ManyRecordWhileOnePrepares) {
     prepareWork(works[i], packed, i == 0 ? 1 : 2);
     works[i].bindings.emplace(must(bind(works[i], meshes)));
   }
-  ASSERT_TRUE(context().prepare(works[0].plan.variants()).ok());
+  ASSERT_TRUE(context().prepare(works[0].plan.pipelines()).ok());
 
   std::atomic<int> failures = 0;
   std::thread preparing([&] {
@@ -187,7 +188,8 @@ TEST_F(ThreadsTest, ManyRecordWhileOnePrepares) {
       Variant variant;
       variant.instancesPerInvocation = instances;
       variant.workgroupSize = 16;
-      if (!context().prepare({&variant, 1})) ++failures;
+      const PipelineId id = variant.id();
+      if (!context().prepare({&id, 1})) ++failures;
     }
   });
   runOnThreads([&](std::size_t thread) {
@@ -222,11 +224,11 @@ TEST_F(ThreadsTest, ManyRecordWhileOneReplacesKernels) {
     prepareWork(works[i], packed, i == 0 ? 1 : 2);
     works[i].bindings.emplace(must(bind(works[i], meshes, reloaded)));
   }
-  for (const Variant& variant : works[0].plan.variants()) {
-    const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, reloaded.limits());
-    modules.try_emplace(vulkan::kernelName(variant, reloaded.limits()), spirv.begin(), spirv.end());
+  for (const PipelineId id : works[0].plan.pipelines()) {
+    const vulkan::PipelineDescription pipeline = must(vulkan::pipelineDescription(id));
+    modules.try_emplace(pipeline.module, pipeline.spirv.begin(), pipeline.spirv.end());
   }
-  must(reloaded.prepare(works[0].plan.variants()));
+  must(reloaded.prepare(works[0].plan.pipelines()));
 
   std::atomic<int> failures = 0;
   constexpr std::uint64_t frames = 2;
@@ -243,10 +245,11 @@ TEST_F(ThreadsTest, ManyRecordWhileOneReplacesKernels) {
   });
   std::thread preparing([&] {
     for (std::uint8_t instances = 1; instances <= 4; ++instances) {
-      Variant variant = works[0].plan.variants().back();
+      Variant variant = variantOf(works[0].plan.pipelines().back());
       variant.instancesPerInvocation = instances;
       variant.workgroupSize = 16;
-      if (!reloaded.prepare({&variant, 1})) ++failures;
+      const PipelineId id = variant.id();
+      if (!reloaded.prepare({&id, 1})) ++failures;
     }
   });
   runOnThreads([&](std::size_t thread) {
@@ -259,7 +262,7 @@ TEST_F(ThreadsTest, ManyRecordWhileOneReplacesKernels) {
   replacing.join();
   preparing.join();
   EXPECT_EQ(failures, 0);
-  EXPECT_GE(replacedPipelines, frames * works[0].plan.variants().size());
+  EXPECT_GE(replacedPipelines, frames * works[0].plan.pipelines().size());
   execute(works);
   EXPECT_TRUE(isSameOutput(works[1], works[2]));
   EXPECT_TRUE(isSameOutput(works[1], works[3]));
@@ -276,7 +279,7 @@ TEST_F(ThreadsTest, ManyBindAndRecord) {
     const samples::MappedBuffer meshes = upload(packed);
     std::array<Work, threadCount> works;
     for (std::size_t i = 0; i < threadCount; ++i) prepareWork(works[i], packed, i == 0 ? 1 : 2);
-    ASSERT_TRUE(context().prepare(works[0].plan.variants()).ok());
+    ASSERT_TRUE(context().prepare(works[0].plan.pipelines()).ok());
     std::atomic<int> failures = 0;
     runOnThreads([&](std::size_t thread) {
       Work& work = works[thread];
@@ -301,14 +304,13 @@ TEST_F(ThreadsTest, ManyBindAndRecord) {
 
 // All threads are in the middle of building one pipeline at the same time. One of the pipelines
 // stays, the others are destroyed.
-TEST_F(ThreadsTest, ManyPrepareTheSameVariants) {
+TEST_F(ThreadsTest, ManyPrepareTheSamePipelines) {
   InterceptedDevice intercepted(device().description());
   interceptPipelines(intercepted);
-  std::vector<Variant> variants(3);
-  for (std::size_t i = 1; i < variants.size(); ++i)
-    variants[i].instancesPerInvocation = static_cast<std::uint8_t>(i + 1);
-  variants[0].kernel = Kernel::palette;
-  const int count = static_cast<int>(variants.size()), threads = static_cast<int>(threadCount);
+  const std::vector<PipelineId> ids{Variant{.kernel = Kernel::palette}.id(),
+                                    Variant{.instancesPerInvocation = 2}.id(),
+                                    Variant{.instancesPerInvocation = 3}.id()};
+  const int count = static_cast<int>(ids.size()), threads = static_cast<int>(threadCount);
   std::barrier together(static_cast<std::ptrdiff_t>(threadCount));
   creatingTogether = &together;
   {
@@ -316,12 +318,12 @@ TEST_F(ThreadsTest, ManyPrepareTheSameVariants) {
     ASSERT_TRUE(shared.ok()) << shared.error().message;
     std::atomic<int> failures = 0;
     runOnThreads([&](std::size_t) {
-      if (!shared->prepare(variants)) ++failures;
+      if (!shared->prepare(ids)) ++failures;
     });
     EXPECT_EQ(failures, 0);
     EXPECT_EQ(pipelinesCreated, threads * count);
     EXPECT_EQ(pipelinesDestroyed, (threads - 1) * count);
-    EXPECT_TRUE(shared->prepare(variants).ok());
+    EXPECT_TRUE(shared->prepare(ids).ok());
     EXPECT_EQ(pipelinesCreated, threads * count) << "they were built before";
   }
   EXPECT_EQ(pipelinesDestroyed, pipelinesCreated);

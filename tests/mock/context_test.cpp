@@ -12,6 +12,7 @@
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
+#include "plan/variant.h"
 
 namespace dermis::test {
 namespace {
@@ -127,8 +128,8 @@ TEST(ContextTest, EveryObjectUsesTheEnginesAllocatorAndIsDestroyed) {
     Result<vulkan::Context> context = vulkan::Context::create(mock.description());
     ASSERT_TRUE(context.ok());
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
     EXPECT_EQ(mock.alive["Pipeline"], 2 + static_cast<int>(allMethods.size()))
         << "what exists is not built again";
     vulkan::Context moved = std::move(*context);
@@ -162,7 +163,7 @@ void expectFailureOf(const char* function, const Error& error) {
 TEST(ContextTest, AFailureWhileBindingIsAnErrorAndLeaksNothing) {
   for (const char* function : {"vkCreateDescriptorPool", "vkAllocateDescriptorSets"}) {
     FailingContext failing(function, 0);
-    ASSERT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
+    ASSERT_TRUE(failing.context->prepare(failing.batch.plan.pipelines()).ok());
     const int before = failing.mock.aliveObjects();
     {
       const Result<vulkan::Bindings> bindings =
@@ -188,13 +189,13 @@ TEST(ContextTest, AFailureWhilePreparingIsAnErrorAndLeaksNothing) {
   for (const char* function : {"vkCreateShaderModule", "vkCreateComputePipelines"}) {
     for (int built = 0; built < pipelines; ++built) {
       FailingContext failing(function, built);
-      const Result<void> prepared = failing.context->prepare(failing.batch.plan.variants());
+      const Result<void> prepared = failing.context->prepare(failing.batch.plan.pipelines());
       ASSERT_FALSE(prepared.ok()) << built;
       expectFailureOf(function, prepared.error());
       EXPECT_EQ(failing.mock.alive["Pipeline"], built);
       EXPECT_EQ(failing.mock.alive["ShaderModule"], 0);
       failing.mock.failing.clear();
-      EXPECT_TRUE(failing.context->prepare(failing.batch.plan.variants()).ok());
+      EXPECT_TRUE(failing.context->prepare(failing.batch.plan.pipelines()).ok());
       EXPECT_EQ(failing.mock.alive["Pipeline"], pipelines);
       failing.context = Error{};
       EXPECT_EQ(failing.mock.aliveObjects(), 0);
@@ -211,7 +212,7 @@ TEST(ContextTest, EveryPipelineIsBuiltWithTheEnginesCache) {
     description.pipelineCache = cache;
     Result<vulkan::Context> context = vulkan::Context::create(description);
     const MockBatch batch = MockBatch::withAllMethods(context->limits());
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
     const std::vector<VkPipelineCache> expected(2 + allMethods.size(), cache);
     EXPECT_EQ(mock.cachesOfPipelines, expected);
   }
@@ -333,25 +334,22 @@ TEST(ContextTest, ModulesAreCreatedForThePipelinesThatAreBuilt) {
   MockVulkan mock;
   Result<vulkan::Context> context = vulkan::Context::create(mock.description());
   EXPECT_TRUE(mock.modules.empty());
-  Variant linear, logarithms, bounds;
-  linear.method = Method::linear;
-  logarithms.method = Method::logMatrix;
-  bounds.bounds = true;
   std::vector<const std::uint32_t*> expected;
-  for (const Variant& variant : {linear, logarithms, bounds}) {
-    for (int twice = 0; twice < 2; ++twice) ASSERT_TRUE(context->prepare({&variant, 1}).ok());
-    expected.push_back(vulkan::kernelSpirv(variant, context->limits()).data());
+  for (const Variant& variant : {Variant{.method = Method::linear},
+                                 Variant{.method = Method::logMatrix}, Variant{.bounds = true}}) {
+    const PipelineId id = variant.id();
+    for (int twice = 0; twice < 2; ++twice) ASSERT_TRUE(context->prepare({&id, 1}).ok());
+    expected.push_back(vulkan::pipelineDescription(id)->spirv.data());
   }
   EXPECT_EQ(mock.modules, expected) << "every day, for comparison, results";
   EXPECT_EQ(mock.alive["ShaderModule"], 0);
 }
 
-TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
+TEST(ContextTest, APipelineThatNeedsAFeatureIsRefusedWithoutIt) {
   MockVulkan mock;
   Result<vulkan::Context> context = vulkan::Context::create(mock.description());
-  Variant variant;
-  variant.texels = true;
-  const Result<void> prepared = context->prepare({&variant, 1});
+  const PipelineId texels = Variant{.texels = true}.id();
+  const Result<void> prepared = context->prepare({&texels, 1});
   ASSERT_FALSE(prepared.ok());
   EXPECT_EQ(prepared.error().code, ErrorCode::missingFeature);
   EXPECT_NE(prepared.error().message.find("scalarBlockLayout"), std::string::npos);
@@ -363,23 +361,34 @@ TEST(ContextTest, AVariantThatNeedsAFeatureIsRefusedWithoutIt) {
 
 TEST(KernelsTest, SpirvIsThereWithoutADevice) {
   std::set<const std::uint32_t*> modules;
-  for (const std::uint32_t storageBuffers : {4u, 8u}) {
-    DeviceLimits limits = richLimits();
-    limits.maxStorageBuffersPerStage = storageBuffers;
+  for (const bool oneOutput : {false, true}) {
     for (const Kernel kernel : {Kernel::palette, Kernel::clear, Kernel::skin}) {
       for (const bool texels : {false, true}) {
-        Variant variant;
-        variant.kernel = kernel;
-        variant.texels = texels;
-        const std::span<const std::uint32_t> spirv = vulkan::kernelSpirv(variant, limits);
-        ASSERT_GT(spirv.size(), 5u);
-        EXPECT_EQ(spirv[0], 0x07230203u);
-        EXPECT_EQ(spirv[1], 0x00010300u) << "SPIR-V 1.3, which Vulkan 1.1 takes";
-        modules.insert(spirv.data());
+        const Variant variant{.kernel = kernel, .texels = texels, .oneOutput = oneOutput};
+        const vulkan::PipelineDescription pipeline = *vulkan::pipelineDescription(variant.id());
+        ASSERT_GT(pipeline.spirv.size(), 5u);
+        EXPECT_EQ(pipeline.spirv[0], 0x07230203u);
+        EXPECT_EQ(pipeline.spirv[1], 0x00010300u) << "SPIR-V 1.3, which Vulkan 1.1 takes";
+        EXPECT_EQ(pipeline.storageBuffers, oneOutput ? 4u : storageBuffersWanted);
+        EXPECT_EQ(pipeline.texelBuffers, texels ? 4u : 0u);
+        modules.insert(pipeline.spirv.data());
       }
     }
   }
   EXPECT_EQ(modules.size(), 5u) << "palettes, results, words, texels, one output";
+}
+
+TEST(KernelsTest, ANumberThatStandsForNoPipelineIsRefused) {
+  const auto codeOf = [](PipelineId id) {
+    const Result<vulkan::PipelineDescription> pipeline = vulkan::pipelineDescription(id);
+    return pipeline ? std::nullopt : std::optional(pipeline.error().code);
+  };
+  const PipelineId good = Variant().id();
+  EXPECT_EQ(codeOf(good), std::nullopt);
+  EXPECT_EQ(codeOf(PipelineId{}), ErrorCode::invalidArgument);
+  EXPECT_EQ(codeOf(PipelineId{~std::uint64_t{0}}), ErrorCode::invalidArgument);
+  EXPECT_EQ(codeOf(PipelineId{static_cast<std::uint64_t>(good) | std::uint64_t{1} << 63}),
+            ErrorCode::invalidArgument);
 }
 
 TEST(KernelsTest, ConstantsStandAtTheirIds) {
@@ -398,8 +407,8 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.influences = 4;
   variant.instancesPerInvocation = 3;
   variant.workgroupSize = 32;
-  const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
-  ASSERT_EQ(constants.count, abi::CONSTANT_COUNT);
+  const std::vector<std::uint32_t> constants = vulkan::pipelineDescription(variant.id())->constants;
+  ASSERT_EQ(constants.size(), abi::CONSTANT_COUNT);
   const std::pair<std::uint32_t, std::uint32_t> expected[] = {
       {abi::CONSTANT_WORKGROUP_SIZE, 32},
       {abi::CONSTANT_METHOD, abi::METHOD_LINEAR},
@@ -416,7 +425,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_FULL, 1},
       {abi::CONSTANT_RECORD, 24}};
   ASSERT_EQ(std::size(expected), abi::CONSTANT_COUNT);
-  for (const auto& [id, value] : expected) EXPECT_EQ(constants.values[id], value) << id;
+  for (const auto& [id, value] : expected) EXPECT_EQ(constants[id], value) << id;
 }
 
 }  // namespace

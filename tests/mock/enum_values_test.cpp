@@ -110,15 +110,6 @@ class EnumValuesTest : public MockContextTest {
                      OutputSizes::oneBuffer(1 << 16)},
                     richLimits(), {}, plan);
   }
-  static Variant variant(const Choice& choice) {
-    Variant variant;
-    variant.method = choice.method;
-    variant.positions = choice.layout.positions;
-    variant.normals = choice.layout.normals;
-    variant.tangents = choice.layout.tangents;
-    variant.motion = choice.layout.motion;
-    return variant;
-  }
   Result<void> skin(const Choice& choice) {
     cpu::Instance instance;
     instance.pose = pose_;
@@ -178,24 +169,16 @@ class EnumValuesTest : public MockContextTest {
                         vulkan::vertexInputFormat(format) == VK_FORMAT_UNDEFINED;
                });
          }},
-        {"everyVariant of needs",
+        {"pipelines of needs",
          [this](const Choice& choice) {
-           return verdict(everyVariant(needs(choice), richLimits(), {}));
+           return verdict(pipelines(needs(choice), richLimits(), {}));
          },
          all},
-        {"everyVariant of a job",
-         [this](const Choice& choice) {
-           return verdict(everyVariant(job(choice), richLimits(), {}));
-         },
+        {"pipelines of a job",
+         [this](const Choice& choice) { return verdict(pipelines(job(choice), richLimits(), {})); },
          attributes},
         {"Context::prepare of needs",
          [this](const Choice& choice) { return context->prepare(needs(choice)); }, all},
-        {"Context::prepare of variants",
-         [this](const Choice& choice) {
-           const Variant one = variant(choice);
-           return context->prepare({&one, 1});
-         },
-         attributes},
         {"makePlan", [this](const Choice& choice) { return plan(job(choice)); }, attributes},
         {"Scene::pipelineNeeds",
          [this](const Choice& choice) {
@@ -319,32 +302,40 @@ TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
       [](std::uint32_t value) { return value <= 1; });
 }
 
-// A key of a variant has few bits for each member. A number that spills into the next member would
-// stand for another variant, whose instances would then be skinned by the wrong pipeline.
+// An ID has few bits for each member. A number that no plan uses must not become a pipeline, and
+// one that spills into the next member would stand for another, by which instances would then be
+// skinned wrong.
 TEST_F(EnumValuesTest, NoVariantPoisonsThePipelinesOfAnother) {
-  const auto expectOnly = [&](auto member, std::set<std::uint32_t> good, const char* name) {
-    for (std::uint32_t value = 0; value < 256; ++value) {
+  const auto expectOnly = [&](auto member, std::set<std::uint32_t> good, std::uint32_t end,
+                              const char* name) {
+    for (std::uint32_t value = 0; value < end; ++value) {
       SCOPED_TRACE(name + (" " + std::to_string(value)));
       Variant variant;
       variant.*member = static_cast<std::remove_reference_t<decltype(variant.*member)>>(value);
+      const PipelineId id = variant.id();
+      ASSERT_EQ(variantOf(id), variant);
       const int pipelines = mock.alive["Pipeline"];
-      EXPECT_EQ(isInvalid(context->prepare({&variant, 1})), !good.contains(value));
-      EXPECT_EQ(vulkan::kernelName(variant, context->limits()).empty(), !good.contains(value));
+      EXPECT_EQ(isInvalid(context->prepare({&id, 1})), !good.contains(value));
+      EXPECT_EQ(isInvalid(vulkan::pipelineDescription(id)), !good.contains(value));
       EXPECT_TRUE(good.contains(value) || mock.alive["Pipeline"] == pipelines);
     }
   };
-  expectOnly(&Variant::kernel, {0, 1, 2, 3}, "kernel");
-  expectOnly(&Variant::recordBytes, {0, 8, 12, 16, 24, 32}, "recordBytes");
-  expectOnly(&Variant::influences, {0, 1, 2, 4}, "influences");
-  expectOnly(&Variant::workgroupSize, {8, 16, 32, 64, 128}, "workgroupSize");
+  // To the end of what the bits of each can hold.
+  expectOnly(&Variant::kernel, {0, 1, 2, 3}, 4, "kernel");
+  expectOnly(&Variant::method, {0, 1, 2, 3, 4, 5, 6, 7, 8}, 16, "method");
+  expectOnly(&Variant::positions, {1, 2, 3, 4, 5, 6}, 16, "positions");
+  expectOnly(&Variant::motion, {0, 1}, 4, "motion");
+  expectOnly(&Variant::recordBytes, {0, 8, 12, 16, 24, 32}, 64, "recordBytes");
+  expectOnly(&Variant::influences, {0, 1, 2, 4}, 8, "influences");
+  expectOnly(&Variant::workgroupSize, {8, 16, 32, 64, 128}, 256, "workgroupSize");
   std::set<std::uint32_t> upTo32;
   for (std::uint32_t instances = 1; instances <= 32; ++instances) upTo32.insert(instances);
-  expectOnly(&Variant::instancesPerInvocation, upTo32, "instancesPerInvocation");
-  // Tunings that plans refuse have no variants, for the same reason.
+  expectOnly(&Variant::instancesPerInvocation, upTo32, 64, "instancesPerInvocation");
+  // Tunings that plans refuse have no pipelines, for the same reason.
   for (const Tuning& tuning : {Tuning{.workgroupSize = 65600}, Tuning{.workgroupSize = 256},
                                Tuning{.instancesPerInvocation = 64}}) {
-    EXPECT_TRUE(isInvalid(everyVariant(needs({}), {}, tuning)));
-    EXPECT_TRUE(isInvalid(everyVariant(job({}), {}, tuning)));
+    EXPECT_TRUE(isInvalid(pipelines(needs({}), {}, tuning)));
+    EXPECT_TRUE(isInvalid(pipelines(job({}), {}, tuning)));
   }
 }
 
@@ -483,7 +474,7 @@ TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
 /// A new enum is missing here, and so are the functions that take it.
 TEST_F(EnumValuesTest, NoEnumIsMissing) {
   const std::set<std::string> known{
-      "Method", "VertexFormat", "Motion", "Arrangement", "Kernel", "BufferRole", "PoseWriter",
+      "Method", "VertexFormat", "Motion", "Arrangement", "PipelineId", "BufferRole", "PoseWriter",
       "ComponentType", "MeshProblem", "ErrorCode", "Use", "QueueTransfer", "ShaderStage",
       "Interpolation", "ChannelPath", "MissingNormals",
       // No function reads one: an index of arrays, bit masks, and what functions return.

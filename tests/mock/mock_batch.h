@@ -92,7 +92,8 @@ struct MockContextTest : public ::testing::Test {
     mock.commands.clear();
     mock.memoryBarriers.clear();
     mock.bufferBarriers.clear();
-    if (Result<void> prepared = context->prepare(batch.plan.variants()); !prepared) return prepared;
+    if (Result<void> prepared = context->prepare(batch.plan.pipelines()); !prepared)
+      return prepared;
     const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
     if (!bindings) return bindings.error();
     return context->record(commandBuffer, batch.plan, *bindings);

@@ -59,7 +59,7 @@ TEST_P(MockProfileTest, BindingsAndViewsKeepItsLimits) {
       range->offset = 3 * limits.minStorageBufferOffsetAlignment;
       range->size = limits.maxStorageBufferRange;
     }
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
     const Result<vulkan::Bindings> bindings = context->createBindings(buffers);
     ASSERT_TRUE(bindings.ok()) << bindings.error().message;
     mock.dispatches.clear();

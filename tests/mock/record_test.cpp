@@ -326,7 +326,7 @@ TEST_F(RecordTest, SetsAreMadeOnce) {
     mock.limits.maxPerStageDescriptorStorageBuffers = storageBuffers;
     ASSERT_NO_FATAL_FAILURE(create());
     const MockBatch batch = wideBatch(context->limits(), true);
-    ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
     const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
     ASSERT_TRUE(bindings.ok());
     std::set<VkDescriptorSet> sets;
@@ -343,7 +343,7 @@ TEST_F(RecordTest, SetsAreMadeOnce) {
 
 // ---- Recording
 
-TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
+TEST_F(RecordTest, NeedsPreparedPipelinesAndNamesTheMissingOne) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
@@ -354,21 +354,22 @@ TEST_F(RecordTest, NeedsPreparedVariantsAndNamesTheMissingOne) {
   const std::string end = " has no pipeline; call Context::prepare for it first";
   const std::string sentences[] = {
       "the palette kernel for dual quaternions with joints that scale" + end,
-      "the clear kernel" + end, "the variant of linear" + skin + " and joints that scale" + end,
-      "the variant of dual_quaternion" + skin + " and joints that scale" + end};
-  ASSERT_EQ(batch.plan.variants().size(), 4u);
+      "the clear kernel" + end,
+      "the skin kernel for linear" + skin + " and joints that scale" + end,
+      "the skin kernel for dual_quaternion" + skin + " and joints that scale" + end};
+  ASSERT_EQ(batch.plan.pipelines().size(), 4u);
   for (std::size_t prepared = 0; prepared < 4; ++prepared) {
     const Result<void> early = context->record(commandBuffer, batch.plan, *bindings);
     ASSERT_FALSE(early.ok());
     EXPECT_EQ(early.error().code, ErrorCode::notPrepared);
     EXPECT_EQ(early.error().message, sentences[prepared]);
     EXPECT_TRUE(mock.commands.empty()) << "nothing is recorded when it fails";
-    ASSERT_TRUE(context->prepare(batch.plan.variants().subspan(prepared, 1)).ok());
+    ASSERT_TRUE(context->prepare(batch.plan.pipelines().subspan(prepared, 1)).ok());
   }
   EXPECT_TRUE(context->record(commandBuffer, batch.plan, *bindings).ok());
 }
 
-TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) {
+TEST_F(RecordTest, TheSentenceOfAMissingPipelineTellsOfMorphTargetsAndAnyNumber) {
   ASSERT_NO_FATAL_FAILURE(create());
   MockBatch batch;
   batch.batch.addMesh(meshOf(10, 5, 5, MeshParts{false, false, 1}));
@@ -376,9 +377,10 @@ TEST_F(RecordTest, TheSentenceOfAMissingVariantTellsOfMorphTargetsAndAnyNumber) 
   batch.batch.addJob(1, 1, Method::linear, false).morphs = batch.batch.keep({{0, 1.0f}});
   batch.makePlan(context->limits());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
-  EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().message,
-            "the variant of linear with positions as float32x3, morph targets, for any number of "
-            "influences and joints that scale has no pipeline; call Context::prepare for it first");
+  EXPECT_EQ(
+      context->record(commandBuffer, batch.plan, *bindings).error().message,
+      "the skin kernel for linear with positions as float32x3, morph targets, for any number "
+      "of influences and joints that scale has no pipeline; call Context::prepare for it first");
 }
 
 /// A few methods and layouts, and batches of nothing else.
@@ -452,7 +454,7 @@ TEST_F(RecordTest, PreparedMethodsAndLayoutsRecordAnyBatch) {
     ASSERT_TRUE(made.ok());
     KnownLayouts known(seed);
     for (const Job& layout : known.layouts)
-      ASSERT_TRUE(made->prepare(*everyVariant(layout, made->limits(), made->tuning())).ok());
+      ASSERT_TRUE(made->prepare(*pipelines(layout, made->limits(), made->tuning())).ok());
     const int pipelines = mock.alive["Pipeline"];
     for (int number = 0; number < 30; ++number) {
       const MockBatch batch = known.batch(made->limits());
@@ -477,7 +479,7 @@ TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
   for (std::size_t index = 0; index < 5; ++index) {
     const PlannedDispatch expected = dispatchesOf(batch.plan)[index];
     const MockDispatch& actual = mock.dispatches[index];
-    EXPECT_EQ(actual.code, vulkan::kernelSpirv(expected.variant, context->limits()).data());
+    EXPECT_EQ(actual.code, vulkan::pipelineDescription(expected.pipeline)->spirv.data());
     EXPECT_EQ(actual.groupCountX, expected.groupCountX);
     EXPECT_EQ(actual.groupCountY, expected.groupCountY);
     ASSERT_LE(expected.constantCount, actual.constants.size());
@@ -570,7 +572,7 @@ TEST_F(RecordTest, BindingsOfAnotherContextAreRefused) {
   ASSERT_NO_FATAL_FAILURE(create());
   const Result<vulkan::Context> other = vulkan::Context::create(mock.description());
   const MockBatch batch = MockBatch::withAllMethods(context->limits());
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
   const Result<vulkan::Bindings> bindings = other->createBindings(batch.buffers());
   EXPECT_EQ(context->record(commandBuffer, batch.plan, *bindings).error().code,
             ErrorCode::invalidArgument);

@@ -12,6 +12,8 @@
 #include "dermis/vulkan/vulkan.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
+#include "plan/variant.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -38,9 +40,9 @@ class ReplaceKernelsTest : public ::testing::Test {
     context.emplace(*vulkan::Context::create(description));
     batch.batch.addJob(0, 0, Method::dualQuaternion, true);
     batch.makePlan(context->limits());
-    for (const Variant& variant : batch.plan.variants()) {
+    for (const Variant& variant : variantsOf(batch.plan.pipelines())) {
       (variant.kernel == Kernel::palette ? palette : skin) =
-          vulkan::kernelName(variant, context->limits());
+          vulkan::pipelineDescription(variant.id())->module;
     }
   }
 
@@ -67,20 +69,20 @@ class ReplaceKernelsTest : public ::testing::Test {
 
 TEST_F(ReplaceKernelsTest, PipelinesAreOfTheSourceAndItsErrorsArePassedOn) {
   error = Error{ErrorCode::shaderError, "skin.comp:7: no"};
-  const Result<void> failed = context->prepare(batch.plan.variants());
+  const Result<void> failed = context->prepare(batch.plan.pipelines());
   ASSERT_FALSE(failed.ok());
   EXPECT_EQ(failed.error().code, ErrorCode::shaderError);
   EXPECT_EQ(failed.error().message, "skin.comp:7: no");
   EXPECT_EQ(mock.alive["Pipeline"], 0);
   error.reset();
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
   EXPECT_NE(std::ranges::find(names, palette), names.end());
   EXPECT_NE(std::ranges::find(names, skin), names.end());
   EXPECT_EQ(mock.alive["Pipeline"], static_cast<int>(names.size()));
 }
 
 TEST_F(ReplaceKernelsTest, OldPipelinesStayUntilTheirFramesAreComplete) {
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
   const int count = mock.alive["Pipeline"];
   const std::vector<const std::uint32_t*> before = record();
   ASSERT_EQ(before.size(), 2u);
@@ -103,7 +105,7 @@ TEST_F(ReplaceKernelsTest, OldPipelinesStayUntilTheirFramesAreComplete) {
 }
 
 TEST_F(ReplaceKernelsTest, AllAreReplacedOrNone) {
-  ASSERT_TRUE(context->prepare(batch.plan.variants()).ok());
+  ASSERT_TRUE(context->prepare(batch.plan.pipelines()).ok());
   const int count = mock.alive["Pipeline"];
   const std::vector<const std::uint32_t*> before = record();
   const std::array<KernelModule, 2> modules{{{palette, paletteB}, {skin, skinB}}};
@@ -124,11 +126,8 @@ TEST_F(ReplaceKernelsTest, AllAreReplacedOrNone) {
 TEST_F(ReplaceKernelsTest, APipelineThatIsBeingBuiltMeanwhileIsBuiltAgain) {
   const KernelModule module{skin, skinB};
   meanwhile = [&] { EXPECT_EQ(context->replaceKernels({&module, 1}, 5, 3).value(), 0u); };
-  Variant variant;
-  for (const Variant& used : batch.plan.variants()) {
-    if (used.kernel == Kernel::skin) variant = used;
-  }
-  ASSERT_TRUE(context->prepare({&variant, 1}).ok());
+  ASSERT_EQ(variantOf(batch.plan.pipelines().back()).kernel, Kernel::skin);
+  ASSERT_TRUE(context->prepare(batch.plan.pipelines().last(1)).ok());
   EXPECT_EQ(asked, 2);
   EXPECT_EQ(mock.alive["Pipeline"], 1);
 }

@@ -139,7 +139,7 @@ TEST_F(MockTexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {
   EXPECT_FALSE(context->limits().texelBuffers);
   const MockBatch batch = MockBatch::withAllMethods(context->limits());
   EXPECT_EQ(batch.plan.buffer(BufferRole::meshes).usage & 0x04u, 0u);
-  for (const Variant& variant : batch.plan.variants()) EXPECT_FALSE(variant.texels);
+  for (const Variant& variant : variantsOf(batch.plan.pipelines())) EXPECT_FALSE(variant.texels);
   ASSERT_TRUE(record(batch).ok());
   EXPECT_TRUE(mock.views.empty());
 }
@@ -180,9 +180,9 @@ TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
     Plan plan;
     EXPECT_TRUE(dermis::makePlan(batch, changed, {}, plan).ok());
     const std::vector<Variant> foreseen = *everyVariant(job, changed, {});
-    for (const Variant& variant : plan.variants())
+    for (const Variant& variant : variantsOf(plan.pipelines()))
       EXPECT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
-    return plan.variants().back().pairs;
+    return variantsOf(plan.pipelines()).back().pairs;
   };
   EXPECT_TRUE(pairs([](Job&, Batch&, DeviceLimits&) {}));
   EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.method = Method::logMatrix; }));
@@ -269,7 +269,7 @@ TEST_F(MockTexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   described.jobs = {&job, 1};
   described.outputs = OutputSizes::oneBuffer(100 * 32);
   ASSERT_TRUE(makePlan(described, context->limits(), {}, batch.plan).ok());
-  ASSERT_TRUE(batch.plan.variants().back().pairs);
+  ASSERT_TRUE(variantsOf(batch.plan.pipelines()).back().pairs);
   vulkan::BatchBuffers buffers = batch.buffers();
   EXPECT_TRUE(record(batch, buffers).ok());
   buffers.outputs.normals.buffer = bufferOf(BufferRole::normals);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dermis/plan.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -71,7 +72,7 @@ TEST(Layout, RefusesWhatCannotStandSo) {
   bad = full;
   bad.motion = static_cast<Motion>(3);
   expectRefused(bad, 0, "motion");
-  EXPECT_FALSE(everyVariant(PipelineNeeds{.layout = bad}, {}, {}).ok());
+  EXPECT_FALSE(pipelines(PipelineNeeds{.layout = bad}, {}, {}).ok());
   bad = {};
   bad.positions = VertexFormat::none;  // nothing at all
   expectRefused(bad, 0, "positions cannot be stored as none");
@@ -83,9 +84,8 @@ TEST(Layout, RefusesWhatCannotStandSo) {
 TEST(Layout, NoPipelineStoresRunsThatAreNotWholeWords) {
   const auto refusalOf = [](const VertexLayout& layout) {
     EXPECT_TRUE(placeVertices(layout, 3).ok());
-    const Result<std::vector<Variant>> variants =
-        everyVariant(PipelineNeeds{.layout = layout}, {}, {});
-    return variants ? "" : variants.error().message;
+    const Result<std::vector<PipelineId>> all = pipelines(PipelineNeeds{.layout = layout}, {}, {});
+    return all ? "" : all.error().message;
   };
   using enum VertexFormat;
   VertexLayout layout{.positions = float16x3, .normals = octahedral8x2};
@@ -139,7 +139,7 @@ TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
             const Batch batch{{&pose, 1}, {&job, 1}, 512, 48, OutputSizes::oneBuffer(1 << 16)};
             Plan plan;
             ASSERT_TRUE(makePlan(batch, limits, {}, plan).ok());
-            for (const Variant& variant : plan.variants()) {
+            for (const Variant& variant : variantsOf(plan.pipelines())) {
               EXPECT_TRUE(std::ranges::find(foreseen, variant) != foreseen.end())
                   << stride << " bytes, at " << place * alignment << " of " << outputOffset;
             }

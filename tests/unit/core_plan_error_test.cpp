@@ -325,7 +325,7 @@ struct RunErrors : public PlanErrors {
         expectInvalid(parts);
       }
     }
-    EXPECT_FALSE(everyVariant(job(), limits, tuning).ok());
+    EXPECT_FALSE(pipelines(job(), limits, tuning).ok());
   }
 };
 
@@ -346,7 +346,7 @@ TEST_F(RunErrors, RunsOfWholeWordsAreGood) {
       for (const std::uint32_t stride : {32u, 36u}) {
         place(stride, {0, positions}, {first, normals}, {second, tangents});
         expectGood();
-        EXPECT_TRUE(everyVariant(job(), limits, tuning).ok());
+        EXPECT_TRUE(pipelines(job(), limits, tuning).ok());
       }
     }
     // The directions of a vertex in an array of their own.

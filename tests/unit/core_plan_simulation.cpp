@@ -71,7 +71,7 @@ class Simulation {
     ASSERT_NO_FATAL_FAILURE(checkPalettes());
     ASSERT_EQ(cleared_.size(), resultCount_);
     ASSERT_NO_FATAL_FAILURE(checkStatuses());
-    ASSERT_TRUE(std::ranges::equal(plan_.variants(), used));
+    ASSERT_TRUE(std::ranges::equal(variantsOf(plan_.pipelines()), used));
   }
 
  private:
@@ -725,7 +725,7 @@ std::vector<std::uint32_t> tablesOf(const Plan& plan) {
 
 void expectEmpty(const Plan& plan) {
   EXPECT_TRUE(dispatchesOf(plan).empty());
-  EXPECT_TRUE(plan.variants().empty());
+  EXPECT_TRUE(plan.pipelines().empty());
   EXPECT_EQ(plan.instanceCount(), 0u);
   EXPECT_EQ(plan.vertexCount(), 0u);
   for (const BufferRole role : {BufferRole::tables, BufferRole::palettes, BufferRole::results})

@@ -6,6 +6,7 @@
 
 #include "core_plan_simulation.h"
 #include "dermis/plan.h"
+#include "plan_commands.h"
 
 namespace dermis::test {
 namespace {
@@ -28,7 +29,7 @@ Variant variantOf(Change change) {
   Plan plan;
   const Result<void> planned = makePlan(batch.batch(), limits, {}, plan);
   EXPECT_TRUE(planned.ok()) << (planned ? "" : planned.error().message);
-  return planned ? plan.variants().back() : Variant{};
+  return planned ? dermis::variantOf(plan.pipelines().back()) : Variant{};
 }
 
 TEST(PlanStaged, EverydayVerticesWithoutGapsAreStaged) {

@@ -89,19 +89,20 @@ TEST(Plan, ResultsTurnIntoTheBoxOfTheirFloats) {
 
 // ---- Variants
 
-/// Collects keys; two variants that differ must not share one.
-struct Keys {
-  std::set<std::uint64_t> keys;
+/// Collects IDs; two variants that differ must not share one.
+struct Ids {
+  std::set<PipelineId> ids;
   std::size_t count = 0;
 
   void add(const Variant& variant) {
-    keys.insert(variant.key());
+    ids.insert(variant.id());
     ++count;
+    ASSERT_EQ(variantOf(variant.id()), variant);
   }
 };
 
-TEST(Plan, VariantsOfAllFormatsAndStoresHaveDifferentKeys) {
-  Keys keys;
+TEST(Plan, VariantsOfAllFormatsAndStoresHaveDifferentIds) {
+  Ids ids;
   Variant variant;
   std::vector<VertexFormat> formats(allVertexFormats.begin(), allVertexFormats.end());
   formats.push_back(VertexFormat::none);
@@ -114,16 +115,16 @@ TEST(Plan, VariantsOfAllFormatsAndStoresHaveDifferentKeys) {
         for (unsigned wide = 0; wide < 16; ++wide) {
           for (std::size_t stream = 0; stream < streamCount; ++stream)
             variant.wide[stream] = (wide >> stream & 1) != 0;
-          keys.add(variant);
+          ids.add(variant);
         }
       }
     }
   }
-  EXPECT_EQ(keys.keys.size(), keys.count);
+  EXPECT_EQ(ids.ids.size(), ids.count);
 }
 
-TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
-  Keys keys;
+TEST(Plan, VariantsOfAllOtherMembersHaveDifferentIds) {
+  Ids ids;
   Variant variant;
   using Bytes = std::initializer_list<std::uint8_t>;
   using Shorts = std::initializer_list<std::uint16_t>;
@@ -133,7 +134,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
         variant.staged = flags % 2 != 0;
         variant.fullInfluences = flags / 2 != 0;
         variant.recordBytes = bytes;
-        keys.add(variant);
+        ids.add(variant);
       }
     }
   };
@@ -163,7 +164,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
       }
     }
   }
-  EXPECT_EQ(keys.keys.size(), keys.count);
+  EXPECT_EQ(ids.ids.size(), ids.count);
 }
 
 // ---- Which variants there are
@@ -171,7 +172,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentKeys) {
 /// Every plan of one job with this layout and method, whatever its mesh, palette and morph targets;
 /// removes from `unused` what they need.
 void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning& tuning,
-                    const std::vector<Variant>& all, std::set<std::uint64_t>& unused) {
+                    const std::vector<Variant>& all, std::set<PipelineId>& unused) {
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u}) {
     OwnedBatch batch;
     batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
@@ -193,9 +194,9 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
                {&job.positions, &job.normals, &job.tangents, &job.previousPositions})
             attribute->offset += moved;
           const Plan out = planned(batch, limits, tuning);
-          for (const Variant& variant : out.variants()) {
+          for (const Variant& variant : variantsOf(out.pipelines())) {
             EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
-            unused.erase(variant.key());
+            unused.erase(variant.id());
           }
         }
       }
@@ -203,7 +204,7 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
   }
 }
 
-/// Skin kernels for a method: see `everyVariant`.
+/// Skin kernels for a method: see `pipelines`.
 std::size_t formsOf(Method method) {
   if (method == Method::linear || method == Method::dualQuaternion) return 7;
   return isForComparison(method) ? 3 : 4;
@@ -241,8 +242,8 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
         Job job = layout;
         job.method = method;
         const std::vector<Variant> all = *everyVariant(job, limits, tuning);
-        std::set<std::uint64_t> unused;
-        for (const Variant& variant : all) unused.insert(variant.key());
+        std::set<PipelineId> unused;
+        for (const Variant& variant : all) unused.insert(variant.id());
         EXPECT_EQ(unused.size(), all.size()) << "one stands twice";
         const auto isHelper = [](const Variant& variant) { return variant.kernel != Kernel::skin; };
         EXPECT_EQ(all.size() - static_cast<std::size_t>(std::ranges::count_if(all, isHelper)),
@@ -259,10 +260,10 @@ TEST(Plan, EveryVariantHasWhatAnyPlanNeedsAndNoMore) {
 TEST(Plan, EveryVariantIsForAnyOffset) {
   DeviceLimits limits = richLimits();
   limits.texelBuffers = true;
-  const auto keysOf = [](std::span<const Variant> variants) {
-    std::set<std::uint64_t> keys;
-    for (const Variant& variant : variants) keys.insert(variant.key());
-    return keys;
+  const auto idsOf = [](std::span<const Variant> variants) {
+    std::set<PipelineId> ids;
+    for (const Variant& variant : variants) ids.insert(variant.id());
+    return ids;
   };
   std::size_t wide = 0, narrow = 0;
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
@@ -275,13 +276,13 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
         for (OutputAttribute* attribute : {&elsewhere.positions, &elsewhere.normals,
                                            &elsewhere.tangents, &elsewhere.previousPositions})
           attribute->offset += moved;
-        EXPECT_EQ(keysOf(*everyVariant(elsewhere, limits, {})), keysOf(all));
+        EXPECT_EQ(idsOf(*everyVariant(elsewhere, limits, {})), idsOf(all));
         Batch alone = batch.batch();
         alone.jobs = {&elsewhere, 1};
         Plan plan;
         ASSERT_TRUE(makePlan(alone, limits, {}, plan).ok());
-        const Variant& variant = plan.variants().back();
-        EXPECT_TRUE(keysOf(all).contains(variant.key()));
+        const Variant variant = variantOf(plan.pipelines().back());
+        EXPECT_TRUE(idsOf(all).contains(variant.id()));
         const std::array<OutputAttribute, streamCount> attributes = attributesOf(elsewhere);
         const std::uint64_t record = std::max<std::uint64_t>(variant.recordBytes, 1);
         EXPECT_EQ(attributes[0].offset % record, 0u);
@@ -314,31 +315,31 @@ TEST(Plan, AttributesThatStandApartAreNotStoredTogether) {
   batch.outputSize = 96 * 4000;
   Plan plan;
   ASSERT_TRUE(makePlan(batch.batch(), limits, {}, plan).ok());
-  ASSERT_EQ(plan.variants().size(), 3u);  // the first is the palette kernel
-  EXPECT_NE(plan.variants()[1].recordBytes, plan.variants()[2].recordBytes);
+  ASSERT_EQ(plan.pipelines().size(), 3u);  // the first is the palette kernel
+  EXPECT_NE(variantOf(plan.pipelines()[1]).recordBytes, variantOf(plan.pipelines()[2]).recordBytes);
 }
 
 // A pipeline follows from the job alone: its neighbors do not change it.
 TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
   const OwnedBatch batch = randomRichBatch(3, 60, false);
-  const auto variantsOf = [&](std::span<const Job> jobs) {
+  const auto skinnedBy = [&](std::span<const Job> jobs) {
     Batch part = batch.batch();
     part.jobs = jobs;
     Plan out;
     EXPECT_TRUE(makePlan(part, richLimits(), {}, out).ok());
-    std::set<std::uint64_t> keys;
-    for (const Variant& variant : out.variants()) {
-      if (variant.kernel == Kernel::skin) keys.insert(variant.key());
+    std::set<PipelineId> ids;
+    for (const Variant& variant : variantsOf(out.pipelines())) {
+      if (variant.kernel == Kernel::skin) ids.insert(variant.id());
     }
-    return keys;
+    return ids;
   };
-  std::set<std::uint64_t> alone;
+  std::set<PipelineId> alone;
   for (const Job& job : batch.jobs) {
-    const std::set<std::uint64_t> own = variantsOf({&job, 1});
+    const std::set<PipelineId> own = skinnedBy({&job, 1});
     EXPECT_EQ(own.size(), 1u);
     alone.insert(own.begin(), own.end());
   }
-  EXPECT_EQ(variantsOf(batch.jobs), alone);
+  EXPECT_EQ(skinnedBy(batch.jobs), alone);
 }
 
 // A kernel leaves the two-phase path out if no palette that it reads may scale.
@@ -377,8 +378,9 @@ bool samePlan(const Plan& a, const Plan& b) {
   };
   return tablesOf(a) == tablesOf(b) &&
          std::ranges::equal(dispatchesOf(a), dispatchesOf(b), sameDispatch) &&
-         std::ranges::equal(a.variants(), b.variants()) && a.instanceCount() == b.instanceCount() &&
-         a.vertexCount() == b.vertexCount() && a.limits() == b.limits() &&
+         std::ranges::equal(a.pipelines(), b.pipelines()) &&
+         a.instanceCount() == b.instanceCount() && a.vertexCount() == b.vertexCount() &&
+         a.limits() == b.limits() &&
          a.buffer(BufferRole::results).size == b.buffer(BufferRole::results).size &&
          a.buffer(BufferRole::palettes).size == b.buffer(BufferRole::palettes).size;
 }

@@ -67,7 +67,7 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
       EXPECT_GT(windows.size(), 1u);
       // One more dispatch a range of output and a variant.
       EXPECT_LE(dispatchesOf(out).size(),
-                1 + out.variants().size() * (batch.outputSize / outputWindowStep(limits) + 1));
+                1 + out.pipelines().size() * (batch.outputSize / outputWindowStep(limits) + 1));
       EXPECT_EQ(out.instanceCount(), batch.jobs.size());
     }
   }

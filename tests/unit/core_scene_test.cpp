@@ -109,7 +109,7 @@ std::vector<std::string> namesOf(const PlannedScene& scene) {
   std::vector<std::string> names;
   for (const Command& command : scene.planned.commands()) {
     if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
-      const Kernel kernel = dispatch->variant.kernel;
+      const Kernel kernel = variantOf(dispatch->pipeline).kernel;
       names.push_back(std::string(dispatch->indirectOffset ? "indirect " : "") +
                       (kernel == Kernel::palette ? "palette"
                        : kernel == Kernel::skin  ? "skin"
@@ -142,10 +142,10 @@ TEST(Scene, AFrameUploadsConvertsSkinsAndReadsBack) {
 }
 
 /// Every variant that the plans of one instance use, with and without active morph targets.
-std::set<std::uint64_t> variantsOf(PlannedScene& owner, InstanceHandle instance,
-                                   std::uint32_t targets) {
+std::set<PipelineId> pipelinesOf(PlannedScene& owner, InstanceHandle instance,
+                                 std::uint32_t targets) {
   Scene& scene = owner.scene();
-  std::set<std::uint64_t> used;
+  std::set<PipelineId> used;
   std::uint64_t frame = 0;
   for (const float weight : {0.f, 1.f}) {
     const MorphWeight morph{0, weight};
@@ -155,7 +155,7 @@ std::set<std::uint64_t> variantsOf(PlannedScene& owner, InstanceHandle instance,
     ++frame;
     EXPECT_TRUE(scene.beginFrame(frame, frame - 1).ok());
     EXPECT_TRUE(owner.plan().ok());
-    for (const Variant& variant : owner.planned.variants()) used.insert(variant.key());
+    for (const PipelineId id : owner.planned.pipelines()) used.insert(id);
     EXPECT_TRUE(owner.commit().ok());
   }
   return used;
@@ -193,11 +193,10 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
           figure.bounds = choices / 2 % 2 != 0;
           figure.culledOnGpu = choices / 4 != 0;
           const PipelineNeeds needs = *scene.pipelineNeeds(figure);
-          std::set<std::uint64_t> foreseen;
-          for (const Variant& variant : *everyVariant(needs, description.limits, {}))
-            foreseen.insert(variant.key());
+          const std::vector<PipelineId> all = *pipelines(needs, description.limits, {});
+          const std::set<PipelineId> foreseen(all.begin(), all.end());
           const InstanceHandle instance = *scene.addInstance(figure);
-          EXPECT_EQ(variantsOf(owner, instance, targets), foreseen)
+          EXPECT_EQ(pipelinesOf(owner, instance, targets), foreseen)
               << methodName(method) << ", " << fewest << " to " << most << " influences, "
               << targets << " targets, choices " << choices;
         }

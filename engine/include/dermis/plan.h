@@ -180,16 +180,6 @@ struct Batch {
   OutputSizes outputs;
 };
 
-/// The compute shaders of Dermis.
-enum class Kernel : std::uint8_t {
-  /// Converts poses to palettes: joints in the form that the skin kernel reads. These are dual
-  /// quaternions, logarithms or matrices, and scale.
-  palette = 0,
-  skin = 1,        ///< skins instances
-  visibility = 2,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
-  clear = 3,       ///< clears the results of instances that are skinned
-};
-
 /// The four attributes of an output, in the order of the arrays below.
 enum class Stream : std::uint8_t {
   positions = 0,
@@ -199,68 +189,26 @@ enum class Stream : std::uint8_t {
 };
 inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
-/// One specialization of a kernel, from which one pipeline is built. An engine compares variants,
-/// and passes them to `Context::prepare` or to the functions of vulkan/kernels.h.
+/// A compute pipeline: one of Dermis' kernels with values for its specialization constants. The
+/// number is the same in every process that uses this version of Dermis. `Context::prepare` builds
+/// pipelines; an engine with its own RHI asks `pipelineDescription` (vulkan/kernels.h).
+enum class PipelineId : std::uint64_t {};
+
+/// All pipelines that a job like this one can need, with any mesh, pose and morph targets, in any
+/// batch, to be built while loading. Jobs are alike if they have the same method, formats, strides,
+/// motion and bounds, and if each offset differs by a multiple of 4 bytes. Offsets of attributes of
+/// one interleaved vertex must all differ by the same number.
 ///
-/// `kernel` and `workgroupSize` apply to all kernels. The palette kernel also has `method`, which
-/// is what joints are converted to (dualQuaternion: dual quaternions, logMatrix: logarithms,
-/// linear: unchanged matrices), and `scales`. All other members apply to the skin kernel only.
-struct Variant {
-  Kernel kernel = Kernel::skin;
-  Method method = Method::dualQuaternion;
-  VertexFormat positions = VertexFormat::float32x3;
-  VertexFormat normals = VertexFormat::none;
-  VertexFormat tangents = VertexFormat::none;
-  /// By `Stream`: whether one store writes the whole attribute, of 8, 12 or 16 bytes. Only with
-  /// `texels`.
-  std::array<bool, streamCount> wide{};
-  Motion motion = Motion::none;
-  bool bounds = false;
-  /// Whether instances have active morph targets.
-  bool morphs = false;
-  /// Whether joints may scale or shear (`PoseDescription::mayScale`).
-  bool scales = false;
-  /// Whether tables, meshes and palettes are read through uniform texel buffers, not storage
-  /// buffers.
-  bool texels = false;
-  /// Whether each position is stored together with the normal that follows it, 8 bytes at a time.
-  /// Only with `texels`, and if `recordBytes` is 0.
-  bool pairs = false;
-  /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
-  /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged` or `texels`.
-  std::uint8_t recordBytes = 0;
-  /// Whether vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
-  bool staged = false;
-  /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
-  std::uint8_t influences = 0;
-  /// Whether every vertex has exactly `influences` influences.
-  bool fullInfluences = false;
-  std::uint8_t instancesPerInvocation = 1;
-  std::uint16_t workgroupSize = 64;
-
-  friend bool operator==(const Variant&, const Variant&) = default;
-  /// A number that differs between any two variants of plans or `everyVariant`.
-  DERMIS_CORE_API std::uint64_t key() const;
-};
-
-/// Whether the kernel writes `InstanceResult`: if it has bounds, or positions in snorm16.
-DERMIS_CORE_API bool hasResults(const Variant& variant);
-
-/// All variants that a job like this one can need, with any mesh, pose and morph targets, in any
-/// batch. For `Context::prepare`, while loading. Jobs are alike if they have the same method,
-/// formats, strides, motion and bounds, and if each offset differs by a multiple of 4 bytes.
-/// Offsets of attributes of one interleaved vertex must all differ by the same number.
-///
-/// The variants are: the palette kernel with and without scale; the clear kernel, for bounds and
-/// snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4
-/// with joints that scale, for any number, and for any number with morph targets. Some methods need
+/// They are: the palette kernel with and without scale; the clear kernel, for bounds and snorm16
+/// positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4 with
+/// joints that scale, for any number, and for any number with morph targets. Some methods need
 /// fewer. With `texelBuffers` each skin kernel may be listed twice: with stores of up to 32 bytes,
 /// for jobs whose attributes are all aligned to the size of their stores, and with narrower stores,
 /// for all other jobs.
 ///
 /// Fails with `invalidArgument` if the job's method, motion, formats or runs of attributes, the
 /// limits or the tuning are not valid.
-DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const Job& job,
+DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const Job& job,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
@@ -278,11 +226,11 @@ struct PipelineNeeds {
   std::optional<bool> mayScale = {};  ///< `PoseDescription::mayScale` of all poses
 };
 
-/// All variants for instances with these needs, at any offset that `placeVertices` accepts. With
+/// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
 /// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does, and with
 /// `invalidArgument` if the layout breaks a rule of `OutputAttribute`, or if the method, the limits
 /// or the tuning are not valid.
-DERMIS_CORE_API Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs,
+DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
 
@@ -345,7 +293,7 @@ struct Binding {
 
 /// vkCmdBindPipeline, vkCmdPushConstants and vkCmdDispatch or vkCmdDispatchIndirect.
 struct DispatchCommand {
-  Variant variant;                ///< which pipeline
+  PipelineId pipeline{};
   std::uint32_t groupCountX = 0;  ///< 0 if indirect
   std::uint32_t groupCountY = 0;  ///< the third count is 1
   /// Workgroups that do work. `groupCountX` × `groupCountY` may be a little larger. 0 if indirect.
@@ -432,8 +380,8 @@ class DERMIS_CORE_API Plan {
   /// that needs it. The engine records the barriers between these commands and its own use of the
   /// output (vulkan/barrier.h).
   std::span<const Command> commands() const;
-  /// The variants of the dispatches, each once. `Context::prepare` must have built them.
-  std::span<const Variant> variants() const;
+  /// The pipelines of the dispatches, each once. `Context::prepare` must have built them.
+  std::span<const PipelineId> pipelines() const;
   /// Requirements of a buffer. The sizes of meshes, poses and outputs are those of the `Batch`, and
   /// the sizes of tables, palettes and results are what this plan needs.
   BufferRequirement buffer(BufferRole role) const;

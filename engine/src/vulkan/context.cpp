@@ -190,25 +190,25 @@ Tuning Context::tuning() const {
   return state_->tuning;
 }
 
-Result<void> ContextState::prepare(std::span<const Variant> variants) const {
-  for (const Variant& variant : variants) {
-    if (Result<void> built = pipelines->build(variant, pipelineLayout); !built) return built;
+Result<void> ContextState::prepare(std::span<const PipelineId> ids) const {
+  for (const PipelineId id : ids) {
+    if (Result<void> built = pipelines->build(id, pipelineLayout); !built) return built;
   }
   return {};
 }
 
 Result<void> ContextState::prepare(const PipelineNeeds& needs, const Tuning& withTuning) const {
-  const Result<std::vector<Variant>> variants = everyVariant(needs, limits, withTuning);
-  if (!variants) return variants.error();
-  return prepare(*variants);
+  const Result<std::vector<PipelineId>> all = dermis::pipelines(needs, limits, withTuning);
+  if (!all) return all.error();
+  return prepare(*all);
 }
 
 Result<void> Context::prepare(const PipelineNeeds& needs) const {
   return state_->prepare(needs, state_->tuning);
 }
 
-Result<void> Context::prepare(std::span<const Variant> variants) const {
-  return state_->prepare(variants);
+Result<void> Context::prepare(std::span<const PipelineId> ids) const {
+  return state_->prepare(ids);
 }
 
 Result<std::uint32_t> Context::replaceKernels(std::span<const KernelModule> modules,

@@ -6,10 +6,10 @@
 #include "abi.h"
 #include "dermis_kernels.h"
 #include "plan/check.h"
+#include "vulkan/pipelines.h"
 
 namespace dermis::vulkan {
 
-static_assert(abi::CONSTANT_COUNT <= SpecializationConstants().values.size());
 static_assert(abi::METHOD_LINEAR == static_cast<std::uint32_t>(Method::linear));
 static_assert(abi::METHOD_DUAL_QUATERNION == static_cast<std::uint32_t>(Method::dualQuaternion));
 static_assert(abi::METHOD_DUAL_QUATERNION_ITERATIVE ==
@@ -74,39 +74,10 @@ bool isAgainstBulge(Method method) {
          method == Method::bulgeControlled;
 }
 
-}  // namespace
-
-/// Must match the names in shaders/CMakeLists.txt.
-std::string kernelName(const Variant& variant, const DeviceLimits& limits) {
-  if (!checkVariant(variant)) return {};
-  const bool oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
-  if (variant.kernel == Kernel::palette) {
-    return variant.method == Method::linear      ? "palette_matrices"
-           : variant.method == Method::logMatrix ? "palette_logarithms"
-                                                 : "palette";
-  }
-  if (variant.kernel == Kernel::clear) return "clear";
-  if (variant.kernel == Kernel::visibility)
-    return oneOutput ? "visibility_one_output" : "visibility";
-  std::string name = "skin";
-  if (isForComparison(variant.method)) name += "_comparison";
-  if (isAgainstBulge(variant.method)) name += "_bulge";
-  if (oneOutput) return name + "_one_output";
-  if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
-  if (variant.staged) return name + "_staged";
-  if (variant.texels) return name + "_texels";
-  return name;
-}
-
-std::span<const std::uint32_t> kernelSpirv(const Variant& variant, const DeviceLimits& limits) {
-  return kernels::find(kernelName(variant, limits));
-}
-
-SpecializationConstants specializationConstants(const Variant& variant) {
-  SpecializationConstants constants;
-  constants.count = abi::CONSTANT_COUNT;
+std::vector<std::uint32_t> constantsOf(const Variant& variant) {
+  std::vector<std::uint32_t> constants(abi::CONSTANT_COUNT);
   const auto set = [&constants](std::uint32_t id, auto value) {
-    constants.values[id] = static_cast<std::uint32_t>(value);
+    constants[id] = static_cast<std::uint32_t>(value);
   };
   set(abi::CONSTANT_WORKGROUP_SIZE, variant.workgroupSize);
   set(abi::CONSTANT_METHOD, variant.method);
@@ -116,7 +87,7 @@ SpecializationConstants specializationConstants(const Variant& variant) {
   set(abi::CONSTANT_NORMAL_FORMAT, variant.normals);
   set(abi::CONSTANT_TANGENT_FORMAT, variant.tangents);
   for (std::uint32_t stream = 0; stream < streamCount; ++stream)
-    constants.values[abi::CONSTANT_WIDE] |= std::uint32_t{variant.wide[stream]} << stream;
+    constants[abi::CONSTANT_WIDE] |= std::uint32_t{variant.wide[stream]} << stream;
   set(abi::CONSTANT_MOTION, variant.motion);
   set(abi::CONSTANT_MORPHS, variant.morphs);
   set(abi::CONSTANT_BOUNDS, variant.bounds);
@@ -124,6 +95,79 @@ SpecializationConstants specializationConstants(const Variant& variant) {
   set(abi::CONSTANT_FULL, variant.fullInfluences);
   set(abi::CONSTANT_RECORD, variant.pairs ? abi::RECORD_IN_PAIRS : variant.recordBytes);
   return constants;
+}
+
+}  // namespace
+
+/// Must match the names in shaders/CMakeLists.txt.
+std::string moduleName(const Variant& variant) {
+  if (variant.kernel == Kernel::palette) {
+    return variant.method == Method::linear      ? "palette_matrices"
+           : variant.method == Method::logMatrix ? "palette_logarithms"
+                                                 : "palette";
+  }
+  if (variant.kernel == Kernel::clear) return "clear";
+  if (variant.kernel == Kernel::visibility)
+    return variant.oneOutput ? "visibility_one_output" : "visibility";
+  std::string name = "skin";
+  if (isForComparison(variant.method)) name += "_comparison";
+  if (isAgainstBulge(variant.method)) name += "_bulge";
+  if (variant.oneOutput) return name + "_one_output";
+  if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
+  if (variant.staged) return name + "_staged";
+  if (variant.texels) return name + "_texels";
+  return name;
+}
+
+std::string pipelineName(const Variant& variant) {
+  if (variant.kernel == Kernel::palette) {
+    return std::string("palette kernel for ") +
+           (variant.method == Method::linear      ? "matrices"
+            : variant.method == Method::logMatrix ? "logarithms"
+                                                  : "dual quaternions") +
+           (variant.scales ? " with joints that scale" : "");
+  }
+  if (variant.kernel == Kernel::clear) return "clear kernel";
+  if (variant.kernel == Kernel::visibility)
+    return "visibility kernel for instances that are culled on the GPU";
+  std::string text = "skin kernel for " + std::string(methodName(variant.method)) +
+                     " with positions as " + std::string(formatName(variant.positions));
+  if (variant.normals != VertexFormat::none)
+    text += ", normals as " + std::string(formatName(variant.normals));
+  if (variant.tangents != VertexFormat::none)
+    text += ", tangents as " + std::string(formatName(variant.tangents));
+  if (variant.motion != Motion::none) text += ", previous positions";
+  if (variant.morphs) text += ", morph targets";
+  if (variant.bounds) text += ", bounds";
+  if (variant.recordBytes != 0)
+    text += ", " + std::to_string(variant.recordBytes) +
+            (variant.staged ? " bytes per vertex through workgroup memory" : " bytes per store");
+  if (variant.pairs) text += ", 8 bytes per store";
+  text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
+          (variant.influences == 0 ? std::string("any number of")
+                                   : std::to_string(variant.influences)) +
+          " influences";
+  if (variant.scales) text += " and joints that scale";
+  return text;
+}
+
+PipelineDescription descriptionOf(const Variant& variant) {
+  PipelineDescription description;
+  description.name = pipelineName(variant);
+  description.module = moduleName(variant);
+  description.spirv = kernels::find(description.module);
+  description.constants = constantsOf(variant);
+  description.storageBuffers = variant.oneOutput ? abi::MIN_BINDING_COUNT : abi::BINDING_COUNT;
+  description.texelBuffers = variant.texels ? abi::TEXEL_BINDING_COUNT : 0;
+  return description;
+}
+
+Result<PipelineDescription> pipelineDescription(PipelineId id) {
+  if (Result<void> good = checkPipeline(id); !good) return good.error();
+  PipelineDescription description = descriptionOf(variantOf(id));
+  if (!description.spirv.empty()) return description;
+  return Error{ErrorCode::missingFeature,
+               "this build of Dermis has no kernel '" + description.module + "'"};
 }
 
 }  // namespace dermis::vulkan

@@ -25,51 +25,44 @@ Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
 }  // namespace
 
 Pipelines::~Pipelines() {
-  for (const auto& [key, built] : pipelines_)
-    table_.destroyPipeline(device_, built.pipeline, allocator_);
+  destroy(pipelines_);
   for (const Retired& retired : retired_)
     table_.destroyPipeline(device_, retired.pipeline, allocator_);
 }
 
-Result<void> Pipelines::build(const Variant& variant, VkPipelineLayout layout) {
-  if (Result<void> good = checkVariant(variant); !good) return good;  // before `key`
-  if (find(variant) != VK_NULL_HANDLE) return {};
-  if (Result<void> good = checkFeatures(variant, limits_); !good) return good;
+Result<void> Pipelines::build(PipelineId id, VkPipelineLayout layout) {
+  if (find(id) != VK_NULL_HANDLE) return {};
+  if (Result<void> good = checkPipeline(id); !good) return good;
+  if (Result<void> good = checkFeatures(variantOf(id), limits_); !good) return good;
   while (true) {
     const std::uint64_t began = generation();
     // Not under the lock: a compile takes long, and `record` must not wait for it.
-    const Result<VkPipeline> pipeline = createFromSource(variant, layout);
+    const Result<VkPipeline> pipeline = createFromSource(id, layout);
     if (!pipeline) return pipeline.error();
 
     const std::unique_lock lock(mutex_);
-    if (generation_ == began &&
-        pipelines_.try_emplace(variant.key(), Built{variant, *pipeline}).second) {
-      return {};
-    }
+    if (generation_ == began && pipelines_.try_emplace(id, *pipeline).second) return {};
     table_.destroyPipeline(device_, *pipeline, allocator_);
     if (generation_ == began) return {};  // another thread was faster
     // Kernels were replaced in the meantime, so build it again.
   }
 }
 
-Result<VkPipeline> Pipelines::createFromSource(const Variant& variant,
-                                               VkPipelineLayout layout) const {
+Result<VkPipeline> Pipelines::createFromSource(PipelineId id, VkPipelineLayout layout) const {
+  PipelineDescription description = descriptionOf(variantOf(id));
+  std::vector<std::uint32_t> words;
   if (kernelSource_.get != nullptr) {
-    const Result<std::vector<std::uint32_t>> spirv =
-        kernelSource_.get(kernelSource_.user, kernelName(variant, limits_));
+    Result<std::vector<std::uint32_t>> spirv =
+        kernelSource_.get(kernelSource_.user, description.module);
     if (!spirv) return spirv.error();
-    if (spirv->empty()) {
-      return Error{ErrorCode::missingFeature,
-                   "KernelSource::get returned no kernel '" + kernelName(variant, limits_) + "'"};
-    }
-    return create(variant, layout, *spirv);
+    words = std::move(*spirv);
+    description.spirv = words;
   }
-  const std::span<const std::uint32_t> spirv = kernelSpirv(variant, limits_);
-  if (spirv.empty()) {
-    return Error{ErrorCode::missingFeature,
-                 "this build of Dermis has no kernel '" + kernelName(variant, limits_) + "'"};
-  }
-  return create(variant, layout, spirv);
+  if (!description.spirv.empty()) return create(description, layout);
+  return Error{ErrorCode::missingFeature,
+               (kernelSource_.get != nullptr ? "KernelSource::get returned no kernel '"
+                                             : "this build of Dermis has no kernel '") +
+                   description.module + "'"};
 }
 
 std::uint64_t Pipelines::generation() const {
@@ -77,37 +70,34 @@ std::uint64_t Pipelines::generation() const {
   return generation_;
 }
 
-void Pipelines::destroy(std::span<const Built> pipelines) const {
-  for (const Built& built : pipelines) table_.destroyPipeline(device_, built.pipeline, allocator_);
+void Pipelines::destroy(const Built& pipelines) const {
+  for (const auto& [id, pipeline] : pipelines)
+    table_.destroyPipeline(device_, pipeline, allocator_);
 }
 
 Result<std::uint32_t> Pipelines::replace(std::span<const KernelModule> modules,
                                          VkPipelineLayout layout, std::uint64_t frame,
                                          std::uint64_t completedFrame) {
-  const auto moduleOf = [&](const Variant& variant) {
-    const std::string name = kernelName(variant, limits_);
+  const auto moduleOf = [&](PipelineId id) {
+    const std::string name = moduleName(variantOf(id));
     return std::ranges::find(modules, std::string_view(name), &KernelModule::name);
   };
-  std::vector<Built> replacements;
+  Built replacements;
   std::vector<VkPipeline> complete;
   while (true) {
     // Pipelines that must be replaced and have no replacement yet. `build` may add some in the
     // meantime.
-    std::vector<Variant> missing;
+    std::vector<PipelineId> missing;
     {
       const std::unique_lock lock(mutex_);
-      for (const auto& [key, built] : pipelines_) {
-        if (modules.empty() || moduleOf(built.variant) == modules.end()) continue;
-        const bool isThere = std::ranges::any_of(
-            replacements, [&key = key](const Built& other) { return other.variant.key() == key; });
-        if (!isThere) missing.push_back(built.variant);
+      for (const auto& [id, pipeline] : pipelines_) {
+        if (!modules.empty() && moduleOf(id) != modules.end() && !replacements.contains(id))
+          missing.push_back(id);
       }
       if (missing.empty()) {
         if (!modules.empty()) ++generation_;
-        for (const Built& replacement : replacements) {
-          Built& built = pipelines_.at(replacement.variant.key());
-          retired_.push_back({std::exchange(built.pipeline, replacement.pipeline), frame});
-        }
+        for (const auto& [id, replacement] : replacements)
+          retired_.push_back({std::exchange(pipelines_.at(id), replacement), frame});
         std::erase_if(retired_, [&](const Retired& retired) {
           if (retired.frame > completedFrame) return false;
           complete.push_back(retired.pipeline);
@@ -116,45 +106,47 @@ Result<std::uint32_t> Pipelines::replace(std::span<const KernelModule> modules,
         break;
       }
     }
-    for (const Variant& variant : missing) {
-      const Result<VkPipeline> pipeline = create(variant, layout, moduleOf(variant)->spirv);
+    for (const PipelineId id : missing) {
+      PipelineDescription description = descriptionOf(variantOf(id));
+      description.spirv = moduleOf(id)->spirv;
+      const Result<VkPipeline> pipeline = create(description, layout);
       if (!pipeline) {
         destroy(replacements);
         return pipeline.error();
       }
-      replacements.push_back({variant, *pipeline});
+      replacements.emplace(id, *pipeline);
     }
   }
   for (const VkPipeline pipeline : complete) table_.destroyPipeline(device_, pipeline, allocator_);
   return static_cast<std::uint32_t>(replacements.size());
 }
 
-Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout layout,
-                                     std::span<const std::uint32_t> spirv) const {
+Result<VkPipeline> Pipelines::create(const PipelineDescription& description,
+                                     VkPipelineLayout layout) const {
   VkShaderModuleCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-  info.codeSize = spirv.size_bytes();
-  info.pCode = spirv.data();
+  info.codeSize = description.spirv.size_bytes();
+  info.pCode = description.spirv.data();
   VkShaderModule module = VK_NULL_HANDLE;
   if (const VkResult result = table_.createShaderModule(device_, &info, allocator_, &module);
       result != VK_SUCCESS) {
     return vulkanError("vkCreateShaderModule", result);
   }
-  const Result<VkPipeline> pipeline = create(variant, layout, module);
+  const Result<VkPipeline> pipeline = create(description, layout, module);
   table_.destroyShaderModule(device_, module, allocator_);
   return pipeline;
 }
 
-Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout layout,
-                                     VkShaderModule module) const {
-  const SpecializationConstants constants = specializationConstants(variant);
-  std::array<VkSpecializationMapEntry, constants.values.size()> entries{};
-  for (std::uint32_t id = 0; id < constants.count; ++id) entries[id] = {id, id * 4, 4};
+Result<VkPipeline> Pipelines::create(const PipelineDescription& description,
+                                     VkPipelineLayout layout, VkShaderModule module) const {
+  const std::vector<std::uint32_t>& constants = description.constants;
+  std::vector<VkSpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < constants.size(); ++id) entries.push_back({id, id * 4, 4});
   VkSpecializationInfo specialization{};
-  specialization.mapEntryCount = constants.count;
+  specialization.mapEntryCount = static_cast<std::uint32_t>(entries.size());
   specialization.pMapEntries = entries.data();
-  specialization.dataSize = std::size_t{constants.count} * 4;
-  specialization.pData = constants.values.data();
+  specialization.dataSize = constants.size() * 4;
+  specialization.pData = constants.data();
 
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
@@ -171,19 +163,14 @@ Result<VkPipeline> Pipelines::create(const Variant& variant, VkPipelineLayout la
       result != VK_SUCCESS) {
     return vulkanError("vkCreateComputePipelines", result);
   }
-  static constexpr std::array<const char*, 4> names{"dermis palette ", "dermis skin ",
-                                                    "dermis visibility", "dermis clear"};
-  std::string name = names[static_cast<std::size_t>(variant.kernel)];
-  if (variant.kernel == Kernel::palette || variant.kernel == Kernel::skin)
-    name += methodName(variant.method);
-  nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, name);
+  nameObject(table_, device_, VK_OBJECT_TYPE_PIPELINE, pipeline, "dermis: " + description.name);
   return pipeline;
 }
 
-VkPipeline Pipelines::find(const Variant& variant) const {
+VkPipeline Pipelines::find(PipelineId id) const {
   const std::shared_lock lock(mutex_);
-  const auto entry = pipelines_.find(variant.key());
-  return entry == pipelines_.end() ? VK_NULL_HANDLE : entry->second.pipeline;
+  const auto entry = pipelines_.find(id);
+  return entry == pipelines_.end() ? VK_NULL_HANDLE : entry->second;
 }
 
 }  // namespace dermis::vulkan

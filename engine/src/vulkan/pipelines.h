@@ -4,6 +4,7 @@
 #include <mutex>
 #include <shared_mutex>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -12,9 +13,17 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/vulkan/kernels.h"
+#include "plan/variant.h"
 #include "vulkan/dispatch_table.h"
 
 namespace dermis::vulkan {
+
+/// `PipelineDescription::name`.
+std::string pipelineName(const Variant& variant);
+/// `PipelineDescription::module`.
+std::string moduleName(const Variant& variant);
+/// Without SPIR-V if this build does not have it.
+PipelineDescription descriptionOf(const Variant& variant);
 
 class Pipelines {
  public:
@@ -31,35 +40,31 @@ class Pipelines {
   Pipelines& operator=(const Pipelines&) = delete;
 
   /// Builds a pipeline unless it exists. Fails with `missingFeature` if the device lacks a feature
-  /// that the variant needs, or if this build of Dermis (or `kernelSource`) has no module for it.
-  Result<void> build(const Variant& variant, VkPipelineLayout layout);
+  /// that it needs, or if this build of Dermis (or `kernelSource`) has no module for it.
+  Result<void> build(PipelineId id, VkPipelineLayout layout);
 
   /// `Context::replaceKernels`.
   Result<std::uint32_t> replace(std::span<const KernelModule> modules, VkPipelineLayout layout,
                                 std::uint64_t frame, std::uint64_t completedFrame);
 
-  /// VK_NULL_HANDLE if the variant has not been built.
-  VkPipeline find(const Variant& variant) const;
+  /// VK_NULL_HANDLE if it has not been built.
+  VkPipeline find(PipelineId id) const;
 
   VkPipelineCache cache() const { return cache_; }
 
  private:
-  struct Built {
-    Variant variant;
-    VkPipeline pipeline = VK_NULL_HANDLE;
-  };
+  using Built = std::unordered_map<PipelineId, VkPipeline>;
   struct Retired {
     VkPipeline pipeline = VK_NULL_HANDLE;
     std::uint64_t frame = 0;  ///< the last that may use it
   };
 
-  Result<VkPipeline> create(const Variant& variant, VkPipelineLayout layout,
-                            std::span<const std::uint32_t> spirv) const;
-  Result<VkPipeline> create(const Variant& variant, VkPipelineLayout layout,
+  Result<VkPipeline> create(const PipelineDescription& description, VkPipelineLayout layout) const;
+  Result<VkPipeline> create(const PipelineDescription& description, VkPipelineLayout layout,
                             VkShaderModule module) const;
-  Result<VkPipeline> createFromSource(const Variant& variant, VkPipelineLayout layout) const;
+  Result<VkPipeline> createFromSource(PipelineId id, VkPipelineLayout layout) const;
   std::uint64_t generation() const;
-  void destroy(std::span<const Built> pipelines) const;
+  void destroy(const Built& pipelines) const;
 
   const DispatchTable& table_;
   const DeviceLimits& limits_;
@@ -68,7 +73,7 @@ class Pipelines {
   KernelSource kernelSource_;
   const VkAllocationCallbacks* allocator_;
   mutable std::shared_mutex mutex_;
-  std::unordered_map<std::uint64_t, Built> pipelines_;
+  Built pipelines_;
   std::vector<Retired> retired_;
   std::uint64_t generation_ = 0;  ///< how often kernels have been replaced
 };

@@ -23,38 +23,6 @@ Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& r
                                                std::to_string(given)};
 }
 
-std::string describe(const Variant& variant) {
-  if (variant.kernel == Kernel::palette) {
-    return std::string("the palette kernel for ") +
-           (variant.method == Method::linear      ? "matrices"
-            : variant.method == Method::logMatrix ? "logarithms"
-                                                  : "dual quaternions") +
-           (variant.scales ? " with joints that scale" : "");
-  }
-  if (variant.kernel == Kernel::clear) return "the clear kernel";
-  if (variant.kernel == Kernel::visibility)
-    return "the visibility kernel, for instances that are culled on the GPU,";
-  std::string text = "the variant of " + std::string(methodName(variant.method)) +
-                     " with positions as " + std::string(formatName(variant.positions));
-  if (variant.normals != VertexFormat::none)
-    text += ", normals as " + std::string(formatName(variant.normals));
-  if (variant.tangents != VertexFormat::none)
-    text += ", tangents as " + std::string(formatName(variant.tangents));
-  if (variant.motion != Motion::none) text += ", previous positions";
-  if (variant.morphs) text += ", morph targets";
-  if (variant.bounds) text += ", bounds";
-  if (variant.recordBytes != 0)
-    text += ", " + std::to_string(variant.recordBytes) +
-            (variant.staged ? " bytes per vertex through workgroup memory" : " bytes per store");
-  if (variant.pairs) text += ", 8 bytes per store";
-  text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
-          (variant.influences == 0 ? std::string("any number of")
-                                   : std::to_string(variant.influences)) +
-          " influences";
-  if (variant.scales) text += " and joints that scale";
-  return text;
-}
-
 }  // namespace
 
 Result<void> BindingsState::checkBuffers(const Plan& plan) const {
@@ -74,7 +42,8 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
   const std::array<const BufferRange*, streamCount> ranges{
       &given.positions, &given.normals, &given.tangents, &given.previousPositions};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const bool isWritten = std::ranges::any_of(plan.variants(), [&](const Variant& variant) {
+    const bool isWritten = std::ranges::any_of(plan.pipelines(), [&](PipelineId id) {
+      const Variant variant = variantOf(id);
       return variant.kernel == Kernel::skin && writesStream(variant, stream);
     });
     if (!isWritten) continue;
@@ -89,7 +58,8 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
 /// Variants that store attributes together write them through the binding of one of them.
 Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
   const BufferRange& positions = buffers.outputs.positions;
-  for (const Variant& variant : plan.variants()) {
+  for (const PipelineId id : plan.pipelines()) {
+    const Variant variant = variantOf(id);
     if (variant.kernel != Kernel::skin ||
         !(variant.pairs || variant.recordBytes != 0 ||
           shareWords(variant.positions, variant.normals, variant.tangents)))
@@ -122,10 +92,11 @@ Result<void> BindingsState::check(const Plan& plan) const {
 
 Result<void> ContextState::check(const Plan& plan, const BoundBuffers& buffers,
                                  DescriptorSets& sets, const char* prepare) const {
-  for (const Variant& variant : plan.variants()) {
-    if (pipelines->find(variant) == VK_NULL_HANDLE)
-      return Error{ErrorCode::notPrepared,
-                   describe(variant) + " has no pipeline; call " + prepare + " for it first"};
+  for (const PipelineId id : plan.pipelines()) {
+    if (pipelines->find(id) == VK_NULL_HANDLE)
+      return Error{ErrorCode::notPrepared, "the " + pipelineName(variantOf(id)) +
+                                               " has no pipeline; call " + prepare +
+                                               " for it first"};
   }
   if (pushesDescriptors()) return {};
   for (const Command& command : plan.commands()) {
@@ -207,7 +178,7 @@ class Recorder {
 
   void operator()(const DispatchCommand& dispatch) {
     table_.cmdBindPipeline(commandBuffer_, VK_PIPELINE_BIND_POINT_COMPUTE,
-                           context_.pipelines->find(dispatch.variant));
+                           context_.pipelines->find(dispatch.pipeline));
     bind({context_, dispatch, buffers_});
     table_.cmdPushConstants(commandBuffer_, context_.pipelineLayout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                             dispatch.constantCount * 4, dispatch.constants.data());

@@ -44,7 +44,7 @@ struct ContextState {
   void recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const;
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
-  Result<void> prepare(std::span<const Variant> variants) const;
+  Result<void> prepare(std::span<const PipelineId> ids) const;
   Result<void> prepare(const PipelineNeeds& needs, const Tuning& withTuning) const;
   /// Whether there is a pipeline for each dispatch; else the error names the function `prepare`,
   /// which builds them. Without push descriptors it also makes their sets.

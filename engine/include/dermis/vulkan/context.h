@@ -115,17 +115,17 @@ class DERMIS_VULKAN_API Context {
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with these needs can use, in plans that are made with
-  /// `tuning()`. For other tunings use `everyVariant`. If `PipelineNeeds::mesh` and `mayScale` are
+  /// `tuning()`. For other tunings use `pipelines`. If `PipelineNeeds::mesh` and `mayScale` are
   /// empty, these are the pipelines for any mesh, pose and morph targets. Once all needs are
   /// prepared, `record` never fails with `notPrepared`. May take long: call it from a loading
   /// thread. If it fails (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of
   /// `KernelSource::get`), the pipelines that were built before remain.
   Result<void> prepare(const PipelineNeeds& needs) const;
 
-  /// Builds the pipelines of these variants. Pipelines that exist are skipped. For jobs whose
-  /// attributes are not placed by a `VertexLayout`: `everyVariant` lists their variants. Fails as
-  /// the other does, with `invalidArgument` for a variant that no plan uses.
-  Result<void> prepare(std::span<const Variant> variants) const;
+  /// Builds these pipelines. Those that exist are skipped. For jobs whose attributes are not placed
+  /// by a `VertexLayout`: `pipelines` lists all that they can need, `Plan::pipelines` those of one
+  /// plan. Fails as the other does, with `invalidArgument` for a number that neither lists.
+  Result<void> prepare(std::span<const PipelineId> ids) const;
 
   /// Swaps kernels between two frames: creates every existing pipeline of these modules again, and
   /// returns their number. Either all are replaced or none. `record` uses the new pipelines from

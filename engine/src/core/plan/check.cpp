@@ -207,6 +207,13 @@ Result<void> checkVariant(const Variant& variant) {
   return checkTuning({variant.workgroupSize, variant.instancesPerInvocation});
 }
 
+Result<void> checkPipeline(PipelineId id) {
+  const Variant variant = variantOf(id);
+  if (variant.id() == id && checkVariant(variant)) return {};
+  return invalid("pipeline " + std::to_string(static_cast<std::uint64_t>(id)) +
+                 " is none of this version of Dermis: `pipelines` lists them");
+}
+
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
   if (Result<void> good = checkMethod(needs.method, {"the instance"}); !good) return good.error();
   const Result<VertexPlaces> places = placeVertices(needs.layout, 1);

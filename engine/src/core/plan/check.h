@@ -41,8 +41,10 @@ DERMIS_CORE_API Result<void> checkMethod(Method method, const Subject& subject);
 /// Whether positions, normals and tangents may have these formats.
 Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
                           const Subject& subject);
-/// Whether all members have values that plans use. `Variant::key` is then unique.
+/// Whether all members have values that plans use.
 DERMIS_CORE_API Result<void> checkVariant(const Variant& variant);
+/// Whether it stands for such a variant.
+DERMIS_CORE_API Result<void> checkPipeline(PipelineId id);
 /// Where one vertex is placed with this layout. Fails unless kernels can store it.
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs);
 

@@ -47,7 +47,7 @@ void setBox(abi::ExtensionRecord& extension, const Box& box) {
 void PlanData::clear() {
   commands.clear();
   bindings.clear();
-  variants.clear();
+  pipelines.clear();
   tables.clear();
   for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
   results.clear();
@@ -102,8 +102,9 @@ Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgrou
                                                " workgroups in one dispatch; the maximum is " +
                                                std::to_string(maximum) + "; split the batch"};
   }
-  DispatchCommand& dispatch = dispatches_.emplace_back().command;
-  dispatch.variant = variant;
+  dispatches_.emplace_back().variant = variant;
+  DispatchCommand& dispatch = dispatches_.back().command;
+  dispatch.pipeline = variant.id();
   dispatch.workgroupCount = push.workgroupCount = static_cast<std::uint32_t>(workgroups);
   setConstants(dispatch, push);
   dispatch.groupCountY =
@@ -119,7 +120,8 @@ Result<void> Encoder::addPaletteDispatches() {
       for (const bool mayScale : {false, true}) {
         const std::span<const abi::PaletteRecord> records = lists.records[form][mayScale];
         if (records.empty()) continue;
-        const Variant variant = paletteVariant(static_cast<PaletteForm>(form), mayScale, tuning_);
+        const Variant variant =
+            paletteVariant(static_cast<PaletteForm>(form), mayScale, limits_, tuning_);
         if (Result<void> good = addPaletteDispatch(variant, records, lists.joints, buffer); !good)
           return good;
       }
@@ -151,7 +153,8 @@ Result<void> Encoder::addClearDispatch() {
   tables.insert(tables.end(), work_->clearedResults.begin(), work_->clearedResults.end());
   alignToUnit(tables);
   return addDispatch(
-      clearVariant(tuning_), divideUp(work_->clearedResults.size(), tuning_.workgroupSize),
+      variantOf(Kernel::clear, limits_, tuning_),
+      divideUp(work_->clearedResults.size(), tuning_.workgroupSize),
       abi::ClearPush{first, static_cast<std::uint32_t>(work_->clearedResults.size()), 0});
 }
 
@@ -387,7 +390,7 @@ void Encoder::appendCulledDispatches() {
     return abi::load<abi::SkinPush>(dispatch.command.constants, 0);
   };
   std::size_t first = dispatches_.size();
-  while (first > 0 && dispatches_[first - 1].command.variant.kernel == Kernel::skin &&
+  while (first > 0 && dispatches_[first - 1].variant.kernel == Kernel::skin &&
          pushOf(dispatches_[first - 1]).groups >= culled_.groups)
     --first;
   const std::size_t count = dispatches_.size() - first;
@@ -423,8 +426,9 @@ Result<void> Encoder::addVisibilityDispatches(std::uint32_t record) {
   culled_.frame = record;
   culled_.maxWorkgroups = limits_.maxWorkgroupCountX;
   for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
+    visibility_[pass].variant = variantOf(Kernel::visibility, limits_, tuning_);
     DispatchCommand& dispatch = visibility_[pass].command;
-    dispatch.variant = visibilityVariant(tuning_);
+    dispatch.pipeline = visibility_[pass].variant.id();
     dispatch.groupCountX = dispatch.workgroupCount;
     dispatch.groupCountY = 1;
     culled_.pass = pass;
@@ -444,7 +448,7 @@ constexpr Access computeBoth = Access::computeRead | Access::computeWrite;
 /// Lists what the kernel reads and writes. A descriptor that its module declares must be valid even
 /// if the variant does not use it, so such a slot gets a buffer that the kernel reads anyway.
 void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers) {
-  const Variant& variant = dispatch.command.variant;
+  const Variant& variant = dispatch.variant;
   std::array<BufferPart, abi::BINDING_COUNT> parts;
   const auto orElse = [](const BufferPart& part, const BufferPart& other) {
     return part.size != 0 ? part : other;
@@ -519,14 +523,14 @@ void Encoder::listDispatches(const PlanBuffers& buffers) {
   }
 }
 
-/// Lists each variant once, and tells dispatches where their bindings are.
+/// Lists each pipeline once, and tells dispatches where their bindings are.
 void Encoder::finish() {
   std::span<const Binding> bindings = plan_->bindings;
   for (Command& command : plan_->commands) {
     auto* dispatch = std::get_if<DispatchCommand>(&command);
     if (dispatch == nullptr) continue;
-    if (std::ranges::find(plan_->variants, dispatch->variant) == plan_->variants.end())
-      plan_->variants.push_back(dispatch->variant);
+    if (std::ranges::find(plan_->pipelines, dispatch->pipeline) == plan_->pipelines.end())
+      plan_->pipelines.push_back(dispatch->pipeline);
     // Each list begins with the tables.
     std::size_t count = 1;
     while (count < bindings.size() && bindings[count].slot != abi::BINDING_TABLES) ++count;

@@ -36,6 +36,7 @@ class Encoder {
  private:
   struct Dispatch {
     DispatchCommand command;
+    Variant variant;
     /// It reads what the palette kernel writes, or adds to results that the clear kernel clears.
     bool isAfterPalettes = false;
     BufferRole joints = BufferRole::palettes;  ///< that the kernel reads

@@ -7,11 +7,11 @@
 
 namespace dermis {
 
-/// Sets `lastVariant_` and `lastKey_`.
+/// Sets `lastVariant_` and `lastPipeline_`.
 void Groups::chooseVariant(const Job& job, const OutputStreams& streams, bool mayScale,
                            const DeviceLimits& limits, const Tuning& tuning) {
   const FormNeeds form = formNeeds(job, mayScale);
-  const bool hasLayout = lastKey_ != 0 && lastLayout_.areThoseOf(job, streams);
+  const bool hasLayout = lastPipeline_ != PipelineId{} && lastLayout_.areThoseOf(job, streams);
   if (hasLayout && form == lastForm_) return;
   if (!hasLayout) {
     lastVariant_ = layoutVariant(job, limits, tuning);
@@ -19,7 +19,7 @@ void Groups::chooseVariant(const Job& job, const OutputStreams& streams, bool ma
   }
   chooseForm(form, lastVariant_);
   lastForm_ = form;
-  lastKey_ = lastVariant_.key();
+  lastPipeline_ = lastVariant_.id();
 }
 
 Result<void> Groups::place(const Job& job, const OutputStreams& streams, const Placing& placing,
@@ -43,7 +43,7 @@ Result<void> Groups::place(const Job& job, const OutputStreams& streams, const P
   chooseVariant(job, streams, placing.mayScale, limits, tuning);
   GroupKey key;
   key.mesh = job.meshOffset;
-  key.variant = lastKey_;
+  key.pipeline = lastPipeline_;
   key.isCulled = placing.isCulled;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     key.strides[stream] = streams[stream].stride;
@@ -97,7 +97,7 @@ std::uint32_t& Groups::headOf(const GroupKey& key) {
   // Groups of one mesh and variant mostly differ by their first window and stride, if at all.
   constexpr std::uint64_t odd[] = {0x9e3779b97f4a7c15u, 0xc2b2ae3d27d4eb4fu, 0x165667b19e3779f9u};
   const std::uint64_t hash =
-      key.mesh * odd[0] + key.variant * odd[1] +
+      key.mesh * odd[0] + static_cast<std::uint64_t>(key.pipeline) * odd[1] +
       ((std::uint64_t{key.windows[0]} << 32 | key.strides[0]) ^ key.firstVertex) * odd[2];
   return heads_[static_cast<std::size_t>(hash >> 32) & (heads_.size() - 1)];
 }
@@ -124,7 +124,7 @@ void Groups::clear() {
   free_.clear();
   std::ranges::fill(heads_, notUsed);
   last_ = notUsed;
-  lastKey_ = 0;
+  lastPipeline_ = {};
 }
 
 }  // namespace dermis

@@ -16,8 +16,8 @@ inline constexpr std::uint32_t notUsed = 0xffffffffu;
 
 /// Runs of instances with equal keys form a group.
 struct GroupKey {
-  std::uint64_t mesh = 0;     ///< bytes into the mesh buffer
-  std::uint64_t variant = 0;  ///< its key
+  std::uint64_t mesh = 0;  ///< bytes into the mesh buffer
+  PipelineId pipeline{};
   std::array<std::uint32_t, streamCount> windows{};
   std::array<std::uint32_t, streamCount> strides{};
   std::uint32_t firstVertex = 0;
@@ -86,7 +86,7 @@ class Groups {
   LayoutNeeds lastLayout_;  ///< of the job that was placed last …
   FormNeeds lastForm_;
   Variant lastVariant_;        ///< … its variant …
-  std::uint64_t lastKey_ = 0;  ///< … and the key of that; 0: there is none
+  PipelineId lastPipeline_{};  ///< … and the ID of that; 0: there is none
   std::vector<VertexRun> vertexRuns_;
 };
 

@@ -1,7 +1,6 @@
 #include "plan/placement.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 #include <span>
 
@@ -13,10 +12,6 @@ const char* streamName(std::size_t stream) {
   static constexpr std::array<const char*, streamCount> names{"positions", "normals", "tangents",
                                                               "previous positions"};
   return names[stream];
-}
-
-bool hasResults(const Variant& variant) {
-  return variant.bounds || isSnormPosition(variant.positions);
 }
 
 namespace {
@@ -128,6 +123,7 @@ bool isAligned(const OutputStreams& streams, const Variant& variant) {
 Variant layoutVariant(const Job& job, const DeviceLimits& limits, const Tuning& tuning,
                       bool areAligned) {
   Variant variant = outputVariant(job);
+  variant.oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   variant.instancesPerInvocation = static_cast<std::uint8_t>(tuning.instancesPerInvocation);
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
   if (canBeStaged(job, outputStreams(job), limits)) {
@@ -207,58 +203,22 @@ bool LayoutNeeds::areThoseOf(const Job& job, const OutputStreams& streams) const
   return relationsIn(streams) == relations;
 }
 
-namespace {
-
-Variant variantOf(Kernel kernel, const Tuning& tuning) {
+Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant;
   variant.kernel = kernel;
+  variant.oneOutput = limits.maxStorageBuffersPerStage < storageBuffersWanted;
   variant.workgroupSize = static_cast<std::uint16_t>(tuning.workgroupSize);
   return variant;
 }
 
-}  // namespace
-
-Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning) {
-  Variant variant = variantOf(Kernel::palette, tuning);
+Variant paletteVariant(PaletteForm form, bool mayScale, const DeviceLimits& limits,
+                       const Tuning& tuning) {
+  Variant variant = variantOf(Kernel::palette, limits, tuning);
   variant.method = form == PaletteForm::matrices     ? Method::linear
                    : form == PaletteForm::logarithms ? Method::logMatrix
                                                      : Method::dualQuaternion;
   variant.scales = mayScale && form != PaletteForm::matrices;
   return variant;
-}
-
-Variant clearVariant(const Tuning& tuning) {
-  return variantOf(Kernel::clear, tuning);
-}
-
-Variant visibilityVariant(const Tuning& tuning) {
-  return variantOf(Kernel::visibility, tuning);
-}
-
-std::uint64_t Variant::key() const {
-  std::uint64_t key = 0;
-  const auto add = [&key](auto value, unsigned bits) {
-    key = key << bits | static_cast<std::uint64_t>(value);
-  };
-  add(kernel, 2);
-  add(method, 4);
-  add(positions, 4);
-  add(normals, 4);
-  add(tangents, 4);
-  for (const bool isWide : wide) add(isWide, 1);
-  add(motion, 2);
-  add(morphs, 1);
-  add(bounds, 1);
-  add(scales, 1);
-  add(texels, 1);
-  add(pairs, 1);
-  add(recordBytes / 4, 4);
-  add(staged, 1);
-  add(influences, 3);
-  add(fullInfluences, 1);
-  add(instancesPerInvocation, 6);
-  add(std::countr_zero(workgroupSize), 3);
-  return key;
 }
 
 namespace {
@@ -279,13 +239,14 @@ struct FormRanges {
 
 /// The kernels before the skin kernel.
 std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
-                                     const Tuning& tuning) {
+                                     const DeviceLimits& limits, const Tuning& tuning) {
   std::vector<Variant> variants;
   const PaletteForm form = paletteForm(job.method);
   for (const bool mayScale : ranges.scales) {
-    if (form != PaletteForm::matrices) variants.push_back(paletteVariant(form, mayScale, tuning));
+    if (form != PaletteForm::matrices)
+      variants.push_back(paletteVariant(form, mayScale, limits, tuning));
   }
-  if (hasResult(job)) variants.push_back(clearVariant(tuning));
+  if (hasResult(job)) variants.push_back(variantOf(Kernel::clear, limits, tuning));
   return variants;
 }
 
@@ -303,9 +264,15 @@ void appendForms(Variant variant, const FormRanges& ranges, std::vector<Variant>
   }
 }
 
+std::vector<PipelineId> idsOf(std::span<const Variant> variants) {
+  std::vector<PipelineId> ids;
+  for (const Variant& variant : variants) ids.push_back(variant.id());
+  return ids;
+}
+
 }  // namespace
 
-Result<std::vector<Variant>> everyVariant(const Job& job, const DeviceLimits& limits,
+Result<std::vector<PipelineId>> pipelines(const Job& job, const DeviceLimits& limits,
                                           const Tuning& tuning) {
   if (Result<void> good = checkLimits(limits); !good) return good.error();
   if (Result<void> good = checkTuning(tuning); !good) return good.error();
@@ -313,13 +280,13 @@ Result<std::vector<Variant>> everyVariant(const Job& job, const DeviceLimits& li
   if (Result<void> good = checkRuns(job, outputStreams(job), {"the job"}); !good)
     return good.error();
   const FormRanges ranges;
-  std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
+  std::vector<Variant> variants = earlierVariants(job, ranges, limits, tuning);
   for (const bool areAligned : {false, true})
     appendForms(layoutVariant(job, limits, tuning, areAligned), ranges, variants);
-  return variants;
+  return idsOf(variants);
 }
 
-Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const DeviceLimits& limits,
+Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const DeviceLimits& limits,
                                           const Tuning& tuning) {
   if (Result<void> good = checkLimits(limits); !good) return good.error();
   if (Result<void> good = checkTuning(tuning); !good) return good.error();
@@ -330,13 +297,13 @@ Result<std::vector<Variant>> everyVariant(const PipelineNeeds& needs, const Devi
   job.bounds = needs.bounds;
   job.place(*places);
   const FormRanges ranges(needs.mesh, needs.mayScale);
-  std::vector<Variant> variants = earlierVariants(job, ranges, tuning);
+  std::vector<Variant> variants = earlierVariants(job, ranges, limits, tuning);
   if (needs.method == Method::linear)  // a scene copies them
-    variants.push_back(paletteVariant(PaletteForm::matrices, false, tuning));
+    variants.push_back(paletteVariant(PaletteForm::matrices, false, limits, tuning));
   // `placeVertices` aligns what it places.
   appendForms(layoutVariant(job, limits, tuning), ranges, variants);
-  if (needs.culledOnGpu) variants.push_back(visibilityVariant(tuning));
-  return variants;
+  if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));
+  return idsOf(variants);
 }
 
 // -- Windows.

@@ -9,6 +9,7 @@
 
 #include "dermis/export.h"
 #include "dermis/plan.h"
+#include "plan/variant.h"
 
 namespace dermis {
 
@@ -83,9 +84,10 @@ inline PaletteForm paletteForm(Method method) {
 }
 
 /// Matrices are copied, whether they scale or not.
-Variant paletteVariant(PaletteForm form, bool mayScale, const Tuning& tuning);
-Variant clearVariant(const Tuning& tuning);
-Variant visibilityVariant(const Tuning& tuning);
+Variant paletteVariant(PaletteForm form, bool mayScale, const DeviceLimits& limits,
+                       const Tuning& tuning);
+/// The clear or the visibility kernel.
+Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The skin kernel for a job, except for the members that `chooseForm` sets. It depends on nothing
 /// else in the batch.

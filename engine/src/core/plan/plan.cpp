@@ -43,8 +43,8 @@ Plan& Plan::operator=(Plan&&) noexcept = default;
 std::span<const Command> Plan::commands() const {
   return data_->commands;
 }
-std::span<const Variant> Plan::variants() const {
-  return data_->variants;
+std::span<const PipelineId> Plan::pipelines() const {
+  return data_->pipelines;
 }
 const DeviceLimits& Plan::limits() const {
   return data_->limits;

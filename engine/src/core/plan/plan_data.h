@@ -66,7 +66,7 @@ struct PlanData {
 
   std::vector<Command> commands;
   std::vector<Binding> bindings;  ///< of all dispatches, one after the other
-  std::vector<Variant> variants;
+  std::vector<PipelineId> pipelines;
   /// Palette records, the numbers of results to clear, group records, instance records, extensions
   /// (each followed by its active morph targets). If the GPU culls: candidates, their dispatches,
   /// and indirect arguments.

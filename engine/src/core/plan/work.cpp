@@ -7,7 +7,7 @@ namespace dermis {
 namespace {
 
 auto dispatchOf(const GroupKey& key) {
-  return std::tie(key.isCulled, key.windows, key.variant);
+  return std::tie(key.isCulled, key.windows, key.pipeline);
 }
 
 }  // namespace

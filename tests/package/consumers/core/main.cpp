@@ -121,7 +121,6 @@ void printSizes() {
                                  sizeof(OutputAttribute),
                                  sizeof(Job),
                                  sizeof(Batch),
-                                 sizeof(Variant),
                                  sizeof(Command),
                                  sizeof(Plan),
                                  sizeof(SceneDescription),
@@ -201,20 +200,20 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   if (Result<void> done = makePlan(batch, limits, tuning, plan); !done) return done;
   std::vector<std::byte> tables(plan.buffer(BufferRole::tables).size);
   if (Result<void> done = writeTables(plan, tables); !done) return done;
-  std::printf("%u dispatches of %zu variants, results at %llu\n", plan.dispatchCount(),
-              plan.variants().size(),
+  std::printf("%u dispatches of %zu pipelines, results at %llu\n", plan.dispatchCount(),
+              plan.pipelines().size(),
               static_cast<unsigned long long>(plan.resultOffset(1).value()));
   print("tables", hashOf(tables));
 
   // What an engine prepares that knows nothing but its vertex and the methods that it uses.
-  std::vector<Variant> foreseen;
+  std::vector<PipelineId> foreseen;
   for (const Job& job : jobs) {
-    const std::vector<Variant> ofMethod = *everyVariant(job, {}, tuning);
+    const std::vector<PipelineId> ofMethod = *pipelines(job, limits, tuning);
     foreseen.insert(foreseen.end(), ofMethod.begin(), ofMethod.end());
   }
-  for (const Variant& variant : plan.variants()) {
-    if (std::find(foreseen.begin(), foreseen.end(), variant) == foreseen.end())
-      return wrong("everyVariant does not foresee a variant of the plan");
+  for (const PipelineId id : plan.pipelines()) {
+    if (std::find(foreseen.begin(), foreseen.end(), id) == foreseen.end())
+      return wrong("`pipelines` does not foresee a pipeline of the plan");
   }
   return {};
 }

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,19 +37,31 @@ bool hasKernels() {
   job.positions = {0, 16, VertexFormat::float16x4};
   job.normals = {8, 16, VertexFormat::octahedral16x2};
   job.tangents = {12, 16, VertexFormat::octahedral16x2};
-  const std::vector<Variant> variants = *everyVariant(job, DeviceLimits{}, Tuning{});
-  std::printf("%zu variants\n", variants.size());
   for (const std::uint32_t buffers : {storageBuffersWanted, 4u}) {
     DeviceLimits limits;
     limits.maxStorageBuffersPerStage = buffers;
-    for (const Variant& variant : variants) {
-      const std::span<const std::uint32_t> words = vulkan::kernelSpirv(variant, limits);
-      if (words.size() < 100 || words[0] != 0x07230203u) return false;
-      const vulkan::SpecializationConstants constants = vulkan::specializationConstants(variant);
-      if (constants.count == 0 || constants.values[0] != variant.workgroupSize) return false;
+    const std::vector<PipelineId> all = *pipelines(job, limits, Tuning{});
+    std::printf("%zu pipelines\n", all.size());
+    for (const PipelineId id : all) {
+      const Result<vulkan::PipelineDescription> pipeline = vulkan::pipelineDescription(id);
+      if (!pipeline || pipeline->spirv.size() < 100 || pipeline->spirv[0] != 0x07230203u)
+        return false;
+      if (pipeline->constants.empty() || pipeline->storageBuffers != buffers) return false;
     }
+    if (all.empty()) return false;
   }
-  return !variants.empty();
+  return true;
+}
+
+/// The last pipeline for positions by one method.
+std::optional<vulkan::PipelineDescription> skinKernel(Method method, bool texels) {
+  DeviceLimits limits;
+  limits.maxStorageBuffersPerStage = storageBuffersWanted;
+  limits.texelBuffers = texels;
+  const std::vector<PipelineId> all = *pipelines(PipelineNeeds{.method = method}, limits, Tuning{});
+  Result<vulkan::PipelineDescription> pipeline = vulkan::pipelineDescription(all.back());
+  if (!pipeline) return std::nullopt;
+  return *pipeline;
 }
 
 /// Whether the kernels for comparison are there where no option leaves them out, and only there.
@@ -58,26 +71,20 @@ bool hasChosenKernels() {
 #else
   constexpr bool isLeftOut = false;
 #endif
-  Variant comparison;
-  comparison.method = Method::logMatrix;
-  DeviceLimits limits;
-  limits.maxStorageBuffersPerStage = storageBuffersWanted;
-  return vulkan::kernelSpirv(comparison, limits).empty() == isLeftOut;
+  const std::optional<vulkan::PipelineDescription> comparison =
+      skinKernel(Method::logMatrix, false);
+  return !comparison.has_value() == isLeftOut;
 }
 
 /// A hash (FNV-1a) of the kernels for every method, for GPUs and for CPU devices.
 std::uint64_t hashOfKernels() {
   std::uint64_t hash = 0xcbf29ce484222325u;
-  DeviceLimits limits;
-  limits.maxStorageBuffersPerStage = storageBuffersWanted;
   for (std::uint32_t method = 0; method < 9; ++method) {
     for (const bool texels : {false, true}) {
-      Variant variant;
-      variant.kernel = Kernel::skin;
-      variant.method = static_cast<Method>(method);
-      variant.texels = texels;
-      for (const std::uint32_t word : vulkan::kernelSpirv(variant, limits))
-        hash = (hash ^ word) * 0x100000001b3u;
+      const std::optional<vulkan::PipelineDescription> pipeline =
+          skinKernel(static_cast<Method>(method), texels);
+      if (!pipeline) continue;
+      for (const std::uint32_t word : pipeline->spirv) hash = (hash ^ word) * 0x100000001b3u;
     }
   }
   return hash;
