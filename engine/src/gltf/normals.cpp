@@ -57,11 +57,13 @@ class Unwelder {
     source_.spend(target.vertices.size(), 4, where_);
     std::vector<std::array<std::uint32_t, 2>> displaced;  // new vertex, element of the target
     for (std::uint32_t element = 0; element < target.vertices.size(); ++element) {
-      const auto [first, last] =
-          std::ranges::equal_range(order_, target.vertices[element], {},
-                                   [&](std::uint32_t corner) { return corners_[corner]; });
-      source_.spend(static_cast<std::uint64_t>(last - first), 24, where_);
-      for (auto corner = first; corner != last; ++corner) displaced.push_back({*corner, element});
+      const std::uint32_t vertex = target.vertices[element];
+      auto corner = std::ranges::lower_bound(order_, vertex, {},
+                                             [&](std::uint32_t of) { return corners_[of]; });
+      for (; corner != order_.end() && corners_[*corner] == vertex; ++corner) {
+        source_.spend(1, 24, where_);
+        displaced.push_back({*corner, element});
+      }
     }
     std::ranges::sort(displaced);
     Indices vertices;
