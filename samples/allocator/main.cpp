@@ -198,8 +198,10 @@ int main() {
   vulkan::SceneRecorderDescription description;
   description.buffers = {&allocator, createForDermis, destroyForDermis};
   description.scene.outputCapacity = Capacity::fixed(64 << 10);
-  const BufferRequirement needed =
-      must(vulkan::SceneRecorder::requirement(context, description, BufferRole::positions));
+  const VertexLayout layout{.positions = VertexFormat::float32x3,
+                            .normals = VertexFormat::float32x3};
+  const BufferRequirement needed = must(vulkan::SceneRecorder::requirement(
+      context, description, BufferRole::positions, {&layout, 1}));
   auto vertexInfo = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   vertexInfo.size = 1 << 20;
   vertexInfo.usage = needed.usage | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
@@ -217,7 +219,7 @@ int main() {
     InstanceDescription figure;
     figure.mesh = must(scene.addMesh(must(pack(mesh, 2))));
     figure.pose = must(scene.addPose(2));
-    figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
+    figure.layout = layout;
     must(recorder.prepare(figure));
     const InstanceHandle instance = must(scene.addInstance(figure));
 

@@ -6,6 +6,7 @@
 //
 //   dermis_crowd --figures 2200 --frames 60
 //   dermis_crowd --device cpu                 the same without Vulkan
+//   dermis_crowd --picture crowd.png          draws the last frame by one indirect draw: picture.h
 //
 // Read `createOnDevice`, `Crowd` and `skinFrame` first: they are what an engine adds. Figures are
 // skinned in the space of the character. The vertex shader that draws a figure applies its
@@ -42,7 +43,9 @@
 #include "kit/in_parallel.h"
 #include "kit/output_file.h"
 #include "kit/program.h"
+#include "kit/render/picture.h"
 #include "kit/timestamps.h"
+#include "picture.h"
 
 namespace {
 
@@ -62,6 +65,8 @@ struct Options {
   std::uint32_t checkInterval = 10;  ///< every N-th frame is compared
   bool validates = false;            ///< with the validation layer
   std::string json;
+  std::string picture;         ///< of the last frame
+  bool drawsOneByOne = false;  ///< although the device has indirect draws
 
   bool checks(std::uint64_t frame) const {
     return verifies && (frame % checkInterval == 0 || frame == frames);
@@ -76,6 +81,15 @@ struct FigureState {
   bool teleports = false;  ///< its pose is unrelated to the pose of the last frame
   bool isInView = false;   ///< neither behind the camera nor too far away
   std::uint32_t updateInterval = 1;
+  double x = 0, z = 0;  ///< where it stands
+};
+
+/// It turns in the middle and moves from side to side.
+struct Walker {
+  explicit Walker(std::uint64_t frame)
+      : x(0.5 * std::sin(2 * std::numbers::pi * static_cast<double>(frame) / 240)),
+        turn(2 * std::numbers::pi * static_cast<double>(frame) / 160) {}
+  double x, turn;
 };
 
 /// The clock of an event that happens to each figure once in every period, in different frames for
@@ -100,15 +114,14 @@ FigureState stateOf(const Character& character, std::uint32_t figure, std::uint3
   const std::uint64_t phase = std::uint64_t{figure} * 7 + jumps / jumpPeriod * (ticks / 3);
   state.pose.tick = static_cast<std::uint32_t>((frame + phase) % ticks);
 
-  // Figures stand in a sunflower spiral (Vogel 1979) of radius 1. The camera turns in the middle
-  // and moves from side to side.
-  const auto time = static_cast<double>(frame);
+  // Figures stand in a sunflower spiral (Vogel 1979) of radius 1.
+  const Walker camera(frame);
   const double angle = std::numbers::pi * (3 - std::sqrt(5.0)) * figure;
   const double radius = std::sqrt((figure + 0.5) / figures);
-  const double turn = 2 * std::numbers::pi * time / 160;
-  const double x = radius * std::cos(angle) - 0.5 * std::sin(2 * std::numbers::pi * time / 240);
-  const double z = radius * std::sin(angle);
-  const double distance = std::hypot(x, z), ahead = x * std::cos(turn) + z * std::sin(turn);
+  state.x = radius * std::cos(angle);
+  state.z = radius * std::sin(angle);
+  const double x = state.x - camera.x, z = state.z, distance = std::hypot(x, z);
+  const double ahead = x * std::cos(camera.turn) + z * std::sin(camera.turn);
   state.updateInterval = distance < 0.3 ? 1 : distance < 0.6 ? 2 : distance < 0.9 ? 4 : 8;
   // A figure just behind the camera may still cast a shadow into the picture.
   state.isInView = distance < 1.3 && ahead > -2 / std::sqrt(figures);
@@ -191,6 +204,7 @@ class Crowd {
 
   Scene& scene() { return *scene_; }
   std::span<const Figure> figures() const { return figures_; }
+  std::span<const MeshHandle> meshes() const { return meshes_; }  ///< by part
   /// How often there was no room for a figure.
   std::uint64_t refusals() const { return refusals_; }
 
@@ -302,10 +316,12 @@ void skinFrame(vulkan::SceneRecorder& recorder, Crowd& crowd, std::uint64_t fram
   if (options.culledOnGpu)
     description.visibility = writeVisibility(crowd, *open.device, visibility);
 
-  // The check copies the vertices. To draw them, use `Use::vertexInput` in both barriers.
+  // The check copies the vertices. An engine that draws in each frame uses `Use::vertexInput` in
+  // both barriers.
   open.context.recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
   must(recorder.record(commandBuffer, description));
-  open.context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
+  const Use use = options.picture.empty() ? Use::copyRead : Use::copyRead | Use::vertexInput;
+  open.context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, use));
 }
 // [/crowd-frame]
 
@@ -499,6 +515,35 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
   recordBarrier(device, commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
 }
 
+/// The parts of the figures in view, in the world: a figure stands for each square meter.
+std::vector<crowd::Drawn> drawnParts(const Crowd& crowd) {
+  const auto figures = crowd.figures();
+  const double radius = std::sqrt(static_cast<double>(figures.size()) / std::numbers::pi) + 1;
+  std::vector<crowd::Drawn> drawn;
+  for (std::uint32_t number = 0; number < figures.size(); ++number) {
+    const Figure& figure = figures[number];
+    if (!figure.now.isInView) continue;
+    JointMatrix place;  // the identity
+    place.m[0][3] = static_cast<float>(radius * figure.now.x);
+    place.m[2][3] = static_cast<float>(radius * figure.now.z);
+    const auto hue = static_cast<float>(number * number % 97);  // near figures differ
+    const glm::vec3 color(0.55f + 0.35f * std::cos(hue), 0.55f + 0.35f * std::cos(hue + 2.1f),
+                          0.55f + 0.35f * std::cos(hue + 4.2f));
+    for (std::uint32_t part = 0; part < figure.instances.size(); ++part)
+      drawn.push_back({figure.instances[part], part, place, color});
+  }
+  return drawn;
+}
+
+/// Above the place of the camera, looking along its direction and down.
+glm::mat4 viewOf(std::uint32_t figures, std::uint64_t frame) {
+  const Walker camera(frame);
+  const float radius = std::sqrt(static_cast<float>(figures) / std::numbers::pi_v<float>) + 1;
+  const glm::vec3 ahead(std::cos(camera.turn), -0.25, std::sin(camera.turn));
+  const glm::vec3 place(radius * static_cast<float>(camera.x), 2.6f, 0);
+  return crowd::viewProjection(place - glm::vec3(2 * ahead.x, 0, 2 * ahead.z), ahead);
+}
+
 ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Options& options) {
   Device& device = *open.device;
   const bool hasTimestamps = must(Timestamps::create(device)).has();
@@ -514,6 +559,11 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
     check.compare(completedFrame, readBack.instances, readBack.buffer.bytes());
   };
 
+  std::optional<crowd::Painter> painter;
+  if (!options.picture.empty())
+    painter.emplace(device, character, crowd.meshes(),
+                    describe(character.parts()[0], options).layout, options.drawsOneByOne);
+
   FrameLoop loop(device, options.framesInFlight);  // destroyed first: it waits
   for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
     const VkCommandBuffer commandBuffer = must(loop.begin());
@@ -527,10 +577,15 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
       readBacks[slot].instances = check.shown(crowd.scene());
       recordReadBack(device, commandBuffer, recorder, readBacks[slot]);
     }
+    if (painter && frame == options.frames) {
+      painter->record(commandBuffer, crowd.scene(), recorder.outputBuffer(), drawnParts(crowd),
+                      viewOf(options.figures, frame));
+    }
     must(loop.submit());
   }
   const std::uint64_t compared = loop.completed();
   must(loop.finish());
+  if (painter) must(render::writePngs(options.picture)->write(painter->picture()));
   for (std::uint64_t frame = compared + 1; frame <= options.frames; ++frame) {
     if (options.checks(frame)) compare(frame);
     must(crowd.scene().beginFrame(frame + inFlight, frame));
@@ -595,11 +650,15 @@ std::optional<ExitStatus> readOptions(int argc, char** argv, Options& options) {
       "--no-verify", [&options] { options.verifies = false; }, "Do not compare; for measurements");
   app.add_flag("--gpu-culling", options.culledOnGpu,
                "Let the GPU decide which instances are visible");
+  app.add_option("--picture", options.picture, "Draw the last frame into a PNG file");
+  app.add_flag("--single-draws", options.drawsOneByOne,
+               "Draw the picture by one command for each part of a figure");
   app.add_flag("--validate", options.validates, "Run with the Vulkan validation layer");
   if (const auto ended = parseOptions(app, argc, argv)) return ended;
   if (options.device != "cpu") return std::nullopt;
   for (const auto& [isAsked, name] : {std::pair{options.culledOnGpu, "--gpu-culling"},
                                       {inFlight->count() != 0, "--frames-in-flight"},
+                                      {!options.picture.empty(), "--picture"},
                                       {options.validates, "--validate"}}) {
     if (!isAsked) continue;
     return reportWrongUsage(fmt::format("{} needs a Vulkan device; --device cpu is not one", name));
@@ -614,7 +673,8 @@ ExitStatus run(int argc, char** argv) {
   if (!character) return reportModelError(character.error());
   std::vector<std::filesystem::path> inputs = character->model().sideFiles;
   inputs.push_back(pathOf(options.model));
-  const std::array<RequestedOutput, 1> outputs{{{"--json", options.json}}};
+  const std::array<RequestedOutput, 2> outputs{
+      {{"--json", options.json}, {"--picture", options.picture}}};
   if (const Result<void> kept = checkOutputFiles(outputs, inputs); !kept)
     return reportWrongUsage(kept.error().message);
   try {
@@ -622,6 +682,7 @@ ExitStatus run(int argc, char** argv) {
     DeviceOptions wanted;
     wanted.device = options.device;
     wanted.validation = options.validates;
+    wanted.graphics = !options.picture.empty();
     OpenDevice open = must(openDevice(wanted));
     return playOnDevice(open, *character, options);
   } catch (const Failure& failure) {

@@ -106,6 +106,8 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     functions.GetPhysicalDeviceFeatures2(device, &features);
     info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
     info.int64 = features.features.shaderInt64 == VK_TRUE;
+    info.indirectDraws = features.features.multiDrawIndirect == VK_TRUE &&
+                         features.features.drawIndirectFirstInstance == VK_TRUE;
     info.scalarBlockLayout = scalarBlockLayout.scalarBlockLayout == VK_TRUE;
     const RayTracingFeatures rayTracing(functions, device, extensions);
     info.accelerationStructures = rayTracing.accelerationStructures();
@@ -272,6 +274,8 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   }
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
+  if (options.graphics && info_.indirectDraws)
+    features_.features.multiDrawIndirect = features_.features.drawIndirectFirstInstance = VK_TRUE;
   if (options.pipelineStatistics && info_.pipelineStatistics)
     features_.features.pipelineStatisticsQuery = VK_TRUE;
   scalarBlockLayout_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES;

@@ -31,7 +31,8 @@ struct DeviceInfo {
   bool accelerationStructures = false;
   bool rayQueries = false;
   bool pipelineStatistics = false;
-  std::string unusable;  ///< why Dermis cannot run on it; empty if it can
+  bool indirectDraws = false;  ///< many by one command, each with its own first instance
+  std::string unusable;        ///< why Dermis cannot run on it; empty if it can
 };
 
 struct DeviceOptions {
@@ -43,7 +44,7 @@ struct DeviceOptions {
   bool pushDescriptors = true;  ///< enable VK_KHR_push_descriptor if the device has it
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries if the device has them
-  bool graphics = false;        ///< requires a graphics queue
+  bool graphics = false;        ///< requires a graphics queue; enables `indirectDraws`
   /// Enable queries that count invocations if the device has them.
   bool pipelineStatistics = false;
   vulkan::KernelSource kernels;  ///< of the context; empty: the library's

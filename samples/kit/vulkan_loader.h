@@ -61,6 +61,7 @@
   X(CmdDispatch)                            \
   X(CmdDraw)                                \
   X(CmdDrawIndexed)                         \
+  X(CmdDrawIndexedIndirect)                 \
   X(CmdBlitImage)                           \
   X(CmdCopyBufferToImage)                   \
   X(CmdCopyImageToBuffer)

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "dermis_command.h"
+#include "pictures.h"
+#include "test_data.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -93,6 +95,27 @@ TEST(CrowdTest, EveryVertexIsRightWithoutVulkan) {
   expectRefusals(report, 3);
 }
 
+// By one indirect draw and by many commands. The model has texture coordinates, which the
+// shader finds by the first vertex of each figure.
+TEST(CrowdTest, APictureIsDrawnByOneCommand) {
+  REQUIRE_DEVICE();
+  const std::optional<std::filesystem::path> data = testDataFolder();
+  if (!data) GTEST_SKIP() << noTestData;
+  const std::string model = (*data / "models/CesiumMan/glTF-Binary/CesiumMan.glb").string();
+  std::vector<samples::render::Picture> pictures;
+  for (const bool isSingle : {false, true}) {
+    const std::string file = outFile("crowd.png");
+    Arguments arguments{"--model",   model, "--figures",     "30",        "--frames", "33",
+                        "--picture", file,  "--gpu-culling", "--validate"};
+    if (isSingle) arguments.emplace_back("--single-draws");
+    const CommandResult result = crowd(arguments);
+    ASSERT_EQ(result.status, 0) << result.errors;
+    pictures.push_back(readPng(file).value());
+  }
+  EXPECT_EQ(pictures[0].pixels, pictures[1].pixels);
+  expectAsReference("crowd_draws", pictures[0]);
+}
+
 TEST(CrowdTest, NothingIsComparedWithoutVerification) {
   const std::string json = outFile("crowd.json");
   const CommandResult result =
@@ -123,6 +146,7 @@ TEST(CrowdTest, EndsAsTheDermisCommandDoes) {
       {{"--device", "cpu", "--gpu-culling"}, 2, "--gpu-culling" + needsVulkan},
       {{"--device", "cpu", "--frames-in-flight", "2"}, 2, "--frames-in-flight" + needsVulkan},
       {{"--device", "cpu", "--validate"}, 2, "--validate" + needsVulkan},
+      {{"--device", "cpu", "--picture", "a.png"}, 2, "--picture" + needsVulkan},
       {{"--model", model, "--json", model},
        2,
        "--json " + model + " would overwrite an input file"},

@@ -237,8 +237,7 @@ TEST(DocumentedExampleTest, AnInstanceIsDrawn) {
   // [draw]
   const InstanceOutput output = must(scene.output(instance));
   const VkBuffer vertices = recorder.outputBuffer();
-  const auto offsets = vulkan::vertexBufferOffsets(figure.layout, output);
-  vkCmdBindVertexBuffers(commandBuffer, 0, 1, &vertices, offsets.data());
+  vkCmdBindVertexBuffers(commandBuffer, 0, 1, &vertices, &output.offset);
   vkCmdBindIndexBuffer(commandBuffer, indices, 0, VK_INDEX_TYPE_UINT32);
   vkCmdDrawIndexed(commandBuffer, indexCount, 1, 0, 0, 0);
   // [/draw]

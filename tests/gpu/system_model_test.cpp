@@ -139,7 +139,8 @@ bool isOfScenesOnly(const std::string& text) {
       std::array{"there is no plan to commit", "read back", "read-back", "fewer than the ",
                  "that the frame copied", "on the CPU", "CPU path", "frames up to ",
                  "newer than the last", "were committed", "begins while the GPU",
-                 "more frames are in flight", "call abandonFrame", "of palettes for "},
+                 "more frames are in flight", "call abandonFrame", "of palettes for ",
+                 "its first vertex is number ", " of the buffer"},
       [&](const char* part) { return text.find(part) != std::string::npos; });
 }
 

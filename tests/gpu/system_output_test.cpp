@@ -56,6 +56,43 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
   }
 }
 
+// Instances begin at multiples of their strides from the beginning of the buffer.
+TEST_F(SystemOutputTest, ARangeHasRoomWhereverItBegins) {
+  const std::array<VertexLayout, 2> layouts{VertexLayout{.normals = VertexFormat::float32x3},
+                                            motionLayout()};
+  const PackedMesh mesh = systemMesh(1, 100);
+  vulkan::SceneRecorderDescription ranged = description();
+  std::uint64_t bytes = 0;
+  for (const VertexLayout& layout : layouts) bytes += 5 * must(placeVertices(layout, 100)).size;
+  ranged.scene.outputCapacity = Capacity::fixed(bytes);
+  const auto requirement = [&](std::span<const VertexLayout> of) {
+    return must(vulkan::SceneRecorder::requirement(context(), ranged, BufferRole::positions, of));
+  };
+  const BufferRequirement needed = requirement(layouts);
+  const samples::MappedBuffer buffer =
+      must(samples::MappedBuffer::create(device(), 1 << 20, needed.usage));
+  const auto added = [&](std::uint64_t begin, std::uint64_t size) {
+    ranged.output = {buffer.handle(), begin, size};
+    const vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context(), ranged));
+    InstanceDescription instance;
+    instance.mesh = must(recorder.scene().addMesh(mesh));
+    instance.pose = must(recorder.scene().addPose(8));
+    std::uint32_t count = 0;
+    for (std::uint32_t number = 0; number < 10; ++number) {
+      instance.layout = layouts[number / 5];
+      count += recorder.scene().addInstance(instance).ok();
+    }
+    ranged.output = {};
+    return count;
+  };
+  std::uint32_t fewest = 10;
+  for (std::uint64_t place = 0; place < 20; ++place) {
+    EXPECT_EQ(added(place * needed.alignment, needed.size), 10u) << place;
+    fewest = std::min(fewest, added(place * needed.alignment, requirement({}).size));
+  }
+  EXPECT_LT(fewest, 10u) << "or the layouts are for nothing";
+}
+
 /// The vertex buffer of an engine, of which Dermis has a part.
 TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   constexpr std::uint64_t whole = 1 << 18, begin = 65 * 192, size = 92'000;

@@ -426,10 +426,6 @@ TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
       EXPECT_EQ(normalFormatBound(format), 0);
       EXPECT_EQ(tangentFormatBound(format), 0);
     }
-    VertexLayout layout;
-    layout.arrangement = number<dermis::Arrangement>(value);
-    const VertexPlaces places = must(placeVertices({}, vertexCount));
-    EXPECT_EQ(vulkan::vertexBufferOffsets(layout, places)[0], places.positions.offset);
     EXPECT_EQ(componentSize(number<ComponentType>(value)) == 0, value > 8);
     EXPECT_EQ(errorCodeName(number<ErrorCode>(value)) == "unknown", value > 11);
     const auto problem = number<MeshProblem>(value);

@@ -62,7 +62,6 @@ std::vector<std::byte> CpuEngine::readOutput() const {
 
 Streams CpuEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
   const InstanceOutput output = must(scene().output(instance));
-  if (output.size == 0) return {};
   const std::uint32_t vertices = vertexCounts_.at({output.mesh.index, output.mesh.generation});
   return readStreams(bytes, output, vertices);
 }

@@ -327,7 +327,7 @@ class ModelSteps {
       engine_->writePose(palette.handle, systemPose(pose));
       model_->writePose(number, pose);
     }
-    if (chance(15)) system().compact(below(40'000));
+    if (chance(15)) compact();
     if (chance(15)) {
       abandon();
       model_->afterAbandon();
@@ -347,9 +347,9 @@ class ModelSteps {
     }
     ++submittedFrames_;
     model_->afterRecord();
+    movedInstances_ += std::exchange(model_->movedInstances, 0);
     const std::uint64_t output = outputNow();
     growths_ += std::exchange(output_, output) != output;
-    movedInstances_ += system().movedInstances().size();
     if (submittedFrames_ % 8 == 0) expectOutputs();
     beginFrame();
   }
@@ -375,16 +375,19 @@ class ModelSteps {
     const auto now = system().statistics();
     SeenScene scene{{now.outputs.used, now.palettes.used, now.meshes.used,
                      now.lastFrame.skinnedInstances, now.lastFrame.instances,
-                     system().skinnedInstances().size(), system().settledInstances().size(),
-                     system().movedInstances().size()}};
+                     system().skinnedInstances().size(), system().settledInstances().size()}};
     if constexpr (hasGpu) scene.numbers.push_back(countsSlots ? system().visibilityCount() : 0);
     for (const ModelInstance& instance : model_->instances) {
       const InstanceOutput output = must(system().output(instance.handle));
       scene.numbers.insert(scene.numbers.end(),
-                           {output.offset, output.size, output.mesh.index,
+                           {output.offset, output.size, output.mesh.index, output.isWritten,
                             std::uint64_t{must(system().isDue(instance.handle))}});
     }
     return scene;
+  }
+  void compact() {
+    system().compact(below(40'000));
+    model_->mayMove = true;
   }
   /// The call failed and the scene is as it was `before`.
   void expectFailed(const Result<void>& done, const SeenScene& before, bool countsSlots = true) {
@@ -455,7 +458,7 @@ class ModelSteps {
           changeSeveral();
       }
     }
-    if (chance(15)) system().compact(below(40'000));
+    if (chance(15)) compact();
   }
   void step() {
     const std::uint32_t kind = below(100);

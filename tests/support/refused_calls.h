@@ -93,6 +93,32 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   calls.push_back({[&system, removed] { return withoutValue(system.isDue(removed)); }});
   calls.push_back({[&system, removed] { return withoutValue(system.bounds(removed)); }});
   calls.push_back({[&system] { return withoutValue(system.writePose({})); }});
+  const auto draw = [&](std::vector<InstanceHandle> instances, std::size_t ranges,
+                        std::size_t draws) {
+    calls.push_back({[&system, instances, ranges, draws] {
+      std::vector<IndexedDraw> out(draws);
+      return system.indexedDraws(instances, std::vector<IndexRange>(ranges), out);
+    }});
+  };
+  draw({objects.instance}, 100, 2);
+  draw({removed}, 100, 1);
+  draw({objects.instance}, 0, 1);
+  const auto drawOther = [&](const VertexLayout& layout) {
+    calls.push_back({[&system, used, first = objects.instance, layout]() -> Result<void> {
+                       InstanceDescription other = used;
+                       other.layout = layout;
+                       const Result<InstanceHandle> added = system.addInstance(other);
+                       if (!added) return added.error();  // there is no room
+                       const std::array<InstanceHandle, 2> both{first, *added};
+                       std::array<IndexedDraw, 2> draws;
+                       const Result<void> drawn =
+                           system.indexedDraws(both, std::vector<IndexRange>(100), draws);
+                       return system.removeInstance(*added) ? drawn : Result<void>();
+                     },
+                     true});
+  };
+  drawOther({.stride = 200});
+  drawOther({.arrangement = Arrangement::planar});
 
   const auto addPose = [&](std::uint32_t joints, PoseWriter writer) {
     calls.push_back({[&system, joints, writer] {

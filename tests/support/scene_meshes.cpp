@@ -43,7 +43,6 @@ std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
 Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& output,
                     std::uint32_t vertexCount) {
   Streams streams;
-  if (output.size == 0) return streams;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     streams[stream] = readAttribute(bytes, attributesOf(output)[stream], vertexCount);
   return streams;

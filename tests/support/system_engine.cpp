@@ -207,7 +207,7 @@ Streams SystemEngine::read(InstanceHandle instance) {
 
 Streams SystemEngine::read(std::span<const std::byte> bytes, InstanceHandle instance) const {
   const InstanceOutput output = must(scene().output(instance));
-  return output.size == 0 ? Streams{} : readStreams(bytes, output, vertexCount(output.mesh));
+  return readStreams(bytes, output, vertexCount(output.mesh));
 }
 
 }  // namespace dermis::test

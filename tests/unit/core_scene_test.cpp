@@ -242,6 +242,7 @@ TEST(Scene, TheGpuChoosesBeforeItSkins) {
                                        "indirect skin",  //
                                        "compute write before copy read",
                                        "counters to read-back",
+                                       "history to read-back",
                                        "results to read-back",
                                        "copy write before host"};
   one.plan(1, 0);
@@ -287,9 +288,12 @@ TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
   const std::vector<std::string> all = namesOf(one.owner);
   one.plan(2, 0);
   EXPECT_EQ(namesOf(one.owner), all);
-  EXPECT_EQ(one.scene.output(one.instance)->size, 0u);
+  const InstanceOutput early = *one.scene.output(one.instance);
+  EXPECT_FALSE(early.isWritten);
+  EXPECT_EQ(early.size, 100u * 12u) << "the place is known";
   ASSERT_TRUE(one.owner.commit().ok());
-  EXPECT_EQ(one.scene.output(one.instance)->size, 100u * 12u);
+  EXPECT_TRUE(one.scene.output(one.instance)->isWritten);
+  EXPECT_EQ(one.scene.output(one.instance)->offset, early.offset);
   EXPECT_EQ(one.scene.statistics().lastFrame.skinnedInstances, 1u);
   one.plan(3, 2);
   EXPECT_TRUE(one.planned.commands().empty());
@@ -1038,6 +1042,71 @@ TEST(Scene, CompactionMovesEachInstanceOnceInAFrame) {
   must(owner.commit());
   must(scene.beginFrame(3, 2));
   EXPECT_EQ(scene.statistics().outputs.used, 12u + 12u + 24u);
+}
+
+TEST(Scene, DrawsAreTheInstancesInTheirOrder) {
+  PlannedScene owner(smallScene());
+  Scene& scene = owner.scene();
+  std::vector<IndexRange> indices;
+  std::vector<InstanceHandle> instances;
+  for (const std::uint32_t vertices : {5u, 2u}) {
+    MeshInfo info;
+    info.byteSize = 512;
+    info.vertexCount = vertices;
+    InstanceDescription description;
+    description.mesh = must(owner.addMesh(info));
+    description.pose = must(scene.addPose(4));
+    instances.push_back(must(scene.addInstance(description)));
+    indices.resize(description.mesh.index + std::size_t{1});
+    indices[description.mesh.index] = {10 * vertices, vertices};
+  }
+  must(scene.change({.instance = instances[1], .visible = false}));
+  const auto drawsOf = [&](const std::vector<InstanceHandle>& list) {
+    std::vector<IndexedDraw> draws(list.size());
+    must(scene.indexedDraws(list, indices, draws));
+    return draws;
+  };
+  EXPECT_EQ(drawsOf({instances[0]})[0].instanceCount, 0u) << "nothing is there yet";
+  must(scene.beginFrame(1, 0));
+  owner.record();
+  const std::vector<IndexedDraw> draws = drawsOf({instances[1], instances[0], instances[0]});
+  ASSERT_EQ(draws.size(), 3u);
+  EXPECT_EQ(draws[0].instanceCount, 0u) << "it was never visible";
+  EXPECT_EQ(draws[0].indexCount, 2u);
+  EXPECT_EQ(draws[0].firstIndex, 20u);
+  for (const std::uint32_t number : {1u, 2u}) {
+    EXPECT_EQ(draws[number].indexCount, 5u);
+    EXPECT_EQ(draws[number].instanceCount, 1u);
+    EXPECT_EQ(draws[number].firstIndex, 50u);
+    EXPECT_EQ(static_cast<std::uint64_t>(draws[number].vertexOffset) * 12,
+              must(scene.output(instances[0])).offset);
+    EXPECT_EQ(draws[number].firstInstance, number);
+  }
+  EXPECT_NE(draws[0].vertexOffset, draws[1].vertexOffset);
+}
+
+TEST(Scene, DrawsBeginBelowTwoToTheThirtyFirst) {
+  for (const bool isLast : {true, false}) {
+    SceneCommandsDescription description = smallScene();
+    description.outputOffset = 12 * ((std::uint64_t{1} << 31) - (isLast ? 256 : 0));
+    PlannedScene owner(description);
+    MeshInfo info;
+    info.byteSize = 4096;
+    info.vertexCount = 100;
+    InstanceDescription figure;
+    figure.mesh = must(owner.addMesh(info));
+    figure.pose = must(owner.scene().addPose(4));
+    const InstanceHandle instance = must(owner.scene().addInstance(figure));
+    const std::vector<IndexRange> indices(figure.mesh.index + std::size_t{1});
+    IndexedDraw draw;
+    const Result<void> drawn = owner.scene().indexedDraws({&instance, 1}, indices, {&draw, 1});
+    ASSERT_EQ(drawn.ok(), isLast);
+    if (isLast) {
+      EXPECT_EQ(draw.vertexOffset, 0x7fffff00);
+    } else {
+      EXPECT_EQ(drawn.error().code, ErrorCode::limitExceeded);
+    }
+  }
 }
 
 /// The version of the only candidate of a plan.

@@ -134,6 +134,11 @@ struct InstanceVisibility {
 
 /// Where the vertices of an instance are in the output buffer.
 struct InstanceOutput {
+  /// Whether vertices are there, as of the last frame that was executed. False for an instance that
+  /// no frame has skinned since it was added, or since `abandonFrame`. The CPU learns that an
+  /// instance that is culled on the GPU was skinned when it reads the frame back, in a later
+  /// `beginFrame`; after a change of mesh it is false until then.
+  bool isWritten = false;
   /// The mesh that the instance was last skinned with. After a change of mesh it is the old mesh
   /// until the instance is skinned again. For an instance that is culled on the GPU it is the old
   /// mesh until the next `commit`.
@@ -141,9 +146,23 @@ struct InstanceOutput {
   /// Bytes from the beginning of the buffer. For interleaved layouts it is a multiple of the
   /// stride, so that a draw can use `firstVertex` instead of a vertex-buffer offset.
   std::uint64_t offset = 0;
-  std::uint64_t size = 0;  ///< bytes; 0 if the instance has not been skinned yet
+  std::uint64_t size = 0;  ///< bytes
   /// The attributes. Their offsets count from the beginning of the buffer.
   OutputAttribute positions, normals, tangents, previousPositions;
+};
+
+/// Indices of a mesh in the index buffer of the engine.
+struct IndexRange {
+  std::uint32_t first = 0, count = 0;
+};
+
+/// VkDrawIndexedIndirectCommand, which is D3D12_DRAW_INDEXED_ARGUMENTS, too.
+struct IndexedDraw {
+  std::uint32_t indexCount = 0;
+  std::uint32_t instanceCount = 0;  ///< 1, or 0 if vertices are not there
+  std::uint32_t firstIndex = 0;
+  std::int32_t vertexOffset = 0;    ///< the first vertex of the instance in the output buffer
+  std::uint32_t firstInstance = 0;  ///< position in the list
 };
 
 /// Bytes of one buffer of a scene.
@@ -313,17 +332,23 @@ class DERMIS_CORE_API Scene {
   Result<void> abandonFrame(std::uint64_t frame);
 
   // -- Results, as of the last frame that was executed. Spans are valid until the next one, or
-  // `abandonFrame`. After `abandonFrame` all three lists are empty.
+  // `abandonFrame`. After `abandonFrame` both lists are empty.
 
-  /// Where the skinned vertices of an instance are.
+  /// Where the skinned vertices of an instance are. The place is known from `addInstance` on.
   Result<InstanceOutput> output(InstanceHandle instance) const;
+  /// Fills `draws`, one for each of `instances`, for one indirect draw from the beginning of the
+  /// output buffer. `indices` are the ranges of all meshes, by `MeshHandle::index`. Fails with
+  /// `invalidArgument` if the sizes of both lists differ, for a mesh without a range, for a layout
+  /// that is not interleaved and for one with another stride than the first; with `limitExceeded`
+  /// for a first vertex beyond 2³¹ − 1. The message names the instance by its position in the list.
+  Result<void> indexedDraws(std::span<const InstanceHandle> instances,
+                            std::span<const IndexRange> indices,
+                            std::span<IndexedDraw> draws) const;
   /// Instances that were skinned, in no particular order, without those culled on the GPU.
   std::span<const InstanceHandle> skinnedInstances() const;
   /// Instances of which only previous positions were written: they came to rest, or became
   /// visible in the same pose.
   std::span<const InstanceHandle> settledInstances() const;
-  /// Instances whose output has another offset than before.
-  std::span<const InstanceHandle> movedInstances() const;
 
   /// The exact box of the positions, from the newest complete frame that skinned the instance.
   /// Empty if there is no such frame, if `InstanceDescription::bounds` is false, or if

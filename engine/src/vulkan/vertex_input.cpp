@@ -4,22 +4,6 @@
 #include <utility>
 
 namespace dermis::vulkan {
-namespace {
-
-/// The offset of each attribute in use (planar), or of the first one only (interleaved).
-std::array<VkDeviceSize, 4> offsetsOf(const VertexLayout& layout,
-                                      const std::array<OutputAttribute, 4>& attributes) {
-  std::array<VkDeviceSize, 4> offsets{};
-  std::size_t count = 0;
-  for (const OutputAttribute& attribute : attributes) {
-    if (attribute.format == VertexFormat::none) continue;
-    offsets[count++] = attribute.offset;
-    if (layout.arrangement == Arrangement::interleaved) break;
-  }
-  return offsets;
-}
-
-}  // namespace
 
 VkFormat vertexInputFormat(VertexFormat format) {
   switch (format) {
@@ -85,18 +69,6 @@ Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNum
     if (Result<void> added = add(attribute, location); !added) return added.error();
   }
   return input;
-}
-
-std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                const InstanceOutput& output) {
-  return offsetsOf(layout,
-                   {output.positions, output.normals, output.tangents, output.previousPositions});
-}
-
-std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                const VertexPlaces& places) {
-  return offsetsOf(layout,
-                   {places.positions, places.normals, places.tangents, places.previousPositions});
 }
 
 }  // namespace dermis::vulkan

@@ -11,7 +11,6 @@
 #include "dermis/export.h"
 #include "dermis/layout.h"
 #include "dermis/result.h"
-#include "dermis/scene.h"
 #include "dermis/vertex_format.h"
 
 namespace dermis::vulkan {
@@ -33,9 +32,10 @@ struct VertexInputNumbers {
   std::uint32_t firstBinding = 0;       ///< number of the first binding
 };
 
-/// For VkPipelineVertexInputStateCreateInfo. An interleaved layout has one binding. A planar layout
-/// has one binding for each attribute, in the order positions, normals, tangents, previous
-/// positions.
+/// For VkPipelineVertexInputStateCreateInfo. An interleaved layout has one binding: bind the output
+/// buffer at `InstanceOutput::offset`, or at 0 for draws with `IndexedDraw::vertexOffset`. A planar
+/// layout has one binding for each attribute, in the order positions, normals, tangents, previous
+/// positions: bind each at its `OutputAttribute::offset`.
 struct VertexInput {
   std::array<VkVertexInputBindingDescription, 4> bindings{};
   std::array<VkVertexInputAttributeDescription, 4> attributes{};
@@ -48,16 +48,5 @@ struct VertexInput {
 /// layout is not a multiple of the size of an attribute's component.
 DERMIS_VULKAN_API Result<VertexInput> vertexInput(const VertexLayout& layout,
                                                   const VertexInputNumbers& numbers = {});
-
-/// The offsets for vkCmdBindVertexBuffers: the first `VertexInput::bindingCount` elements, in bytes
-/// from the beginning of the output buffer. All bindings have the same buffer. With an interleaved
-/// layout an engine may bind offset 0 instead, and draw with `firstVertex` =
-/// `InstanceOutput::offset` / stride.
-DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                                  const InstanceOutput& output);
-/// The same for what `placeVertices` returned. Offsets count from the beginning of the range that
-/// is bound as the output.
-DERMIS_VULKAN_API std::array<VkDeviceSize, 4> vertexBufferOffsets(const VertexLayout& layout,
-                                                                  const VertexPlaces& places);
 
 }  // namespace dermis::vulkan

@@ -589,6 +589,7 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     if (culls) {
       commands.emplace_back(CopyCommand{counters.buffer, buffers[BufferRole::readBack].buffer, 0,
                                         readBackCounters, counters.size});
+      if (frame.history.size != 0) commands.emplace_back(frame.history);
     }
     append(frame.results);
     commands.emplace_back(BarrierCommand{Access::copyWrite, Access::hostRead});

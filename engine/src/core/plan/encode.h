@@ -20,6 +20,7 @@ struct FrameWork {
   std::span<const UploadCommand> uploads;  ///< but for the tables
   std::span<const CopyCommand> moves;      ///< of outputs
   std::span<const CopyCommand> results;    ///< to the read-back buffer
+  CopyCommand history;                     ///< the same, if it has bytes
 };
 
 /// Call `encode`, then one of the functions that list commands.

@@ -151,12 +151,15 @@ struct SceneInstance {
 
   // Of those culled on the GPU.
   std::uint32_t version = 0;  ///< of what it should show, as of the last record
+  /// The first version that the GPU skins to where it is shown.
+  std::uint32_t firstVersion = 0;
   std::uint32_t culledIndex = notUsed;
 
   // Rarely read.
   MeshHandle mesh;
   PoseHandle poseHandle;
   bool bounds = false;
+  bool isWritten = false;      ///< `InstanceOutput::isWritten`
   std::optional<Place> shown;  ///< where it was last recorded
 };
 
@@ -289,6 +292,7 @@ struct SceneBooks {
   void gatherCulled();
   void gatherMoves();
   void gatherResults();
+  void readHistory(std::span<const std::byte> records);
   void addDue(std::uint32_t index, bool restarts);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
   bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
@@ -383,9 +387,10 @@ struct SceneBooks {
   std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
   std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them
   std::vector<CopyCommand> resultCopies_, growth_;
+  CopyCommand historyCopy_ = {};  ///< what `ReadBack::history` becomes
   std::vector<UploadCommand> uploads_;
   PlanBuffers buffers_;  ///< that it names
-  std::vector<InstanceHandle> skinned_, settled_, moved_;
+  std::vector<InstanceHandle> skinned_, settled_;
   FrameStatistics planned_, committed_;
 
   /// The results that a frame reads back.
@@ -393,6 +398,7 @@ struct SceneBooks {
     std::uint64_t frame = 0;
     bool hasCounters = false;
     std::vector<CopyCommand> results;
+    CopyCommand history = {};  ///< no bytes if all that are culled on the GPU were written before
     SceneBufferMemory buffer;
   };
 

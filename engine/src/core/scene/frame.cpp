@@ -125,12 +125,16 @@ void SceneBooks::gatherSettling() {
   }
 }
 
-/// All culled instances, in every frame: the CPU does not know which ones the GPU skinned.
+/// All culled instances, in every frame: the CPU does not know which ones the GPU skinned. It reads
+/// the history back as long as it waits for one to be written.
 void SceneBooks::gatherCulled() {
+  historyCopy_ = {};
   for (const std::uint32_t index : culled_) {
     SceneInstance& instance = instances_.at(index);
     const InstanceState& state = states_[index];
     if (!isDisplayed(state.view)) continue;
+    if (!instance.isWritten || instance.shown != instance.target)
+      historyCopy_.size = slotCapacity_ * sizeof(abi::HistoryRecord);
     std::uint32_t version = instance.version;
     const bool isNew = version == 0 || actionOf(state, instance.pose, state.need) >= Action::skin;
     if (isNew) {
@@ -261,10 +265,14 @@ Result<void> SceneBooks::plan(Plan& out) {
     return good;
   }
   for (CopyCommand& copy : resultCopies_) copy.to = nextReadBack().buffer.number;
+  historyCopy_.from = history_.now.number;
+  historyCopy_.to = nextReadBack().buffer.number;
+  historyCopy_.toOffset = readBackResults + sizes().results * sizeof(InstanceResult);
   listGrowth();
   listUploads();
   nameBuffers();
-  encoder_.listFrame(buffers_, {clearHistory_, growth_, uploads_, moves_, resultCopies_});
+  encoder_.listFrame(buffers_,
+                     {clearHistory_, growth_, uploads_, moves_, resultCopies_, historyCopy_});
   isPlanned_ = true;
   return {};
 }
@@ -274,9 +282,12 @@ bool SceneBooks::commitShift(SceneInstance& instance, InstanceHandle handle) {
   const bool isMove = instance.shown && instance.shown->mesh == instance.target.mesh;
   const bool isCulled = states_[handle.index].isCulled;
   if (!isMove && !isCulled && instance.plannedIn != planNumber_) return false;
-  if (instance.shown && instance.shown != instance.target) {
+  if (instance.shown && instance.shown != instance.target)
     retire(outputStore_.ranges, instance.shown->bytes);
-    moved_.push_back(handle);
+  if (isCulled && !isMove) {
+    const bool isVersioned = states_[handle.index].need == Need::none;
+    instance.isWritten = false;
+    instance.firstVersion = isVersioned ? instance.version : nextVersion_ + 1;
   }
   instance.shown = instance.target;
   instance.isShifting = false;
@@ -288,6 +299,7 @@ void SceneBooks::commitInstance(std::uint32_t index) {
   InstanceState& state = states_[index];
   SceneInstance& instance = instances_.at(index);
   state.need = Need::none;
+  if (!state.isCulled) instance.isWritten = true;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
 }
 
@@ -305,6 +317,7 @@ Result<void> SceneBooks::commit() {
   readBack.frame = frame_;
   readBack.hasCounters = culls;
   readBack.results.swap(resultCopies_);
+  readBack.history = historyCopy_;
   for (GrowingBuffer* buffer : keptBuffers())
     buffer->copied = std::exchange(buffer->before, SceneBufferMemory());
   output_ = outputStore_.buffer.now.number;
@@ -314,7 +327,6 @@ Result<void> SceneBooks::commit() {
   poseUploads_.clear();
   skinned_.clear();
   settled_.clear();
-  moved_.clear();
   moving_.clear();
   for (const Conversion& conversion : conversions_) {
     ScenePose& pose = poses_.at(conversion.pose.index);
@@ -372,8 +384,11 @@ void SceneBooks::abandon() {
     if (state.generation == 0) continue;
     state.isMoving = false;
     state.view = isDisplayed(state.view) ? View::shown : View::hidden;
-    instances_.at(index).firstFrame = 0;
-    instances_.at(index).version = 0;
+    SceneInstance& instance = instances_.at(index);
+    instance.firstFrame = 0;
+    instance.version = 0;
+    instance.isWritten = false;
+    instance.firstVersion = nextVersion_ + 1;
     raise(index, Need::restart);
   }
   for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
@@ -395,7 +410,6 @@ void SceneBooks::abandon() {
   uploadedPoses_.clear();
   skinned_.clear();
   settled_.clear();
-  moved_.clear();
   committed_ = {};
   if (owner_.frameAbandoned != nullptr) owner_.frameAbandoned(owner_.user);
 }
@@ -473,6 +487,8 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
                    std::to_string(culling_.frame));
   }
   std::uint64_t needed = found->hasCounters ? readBackResults : 0;
+  const CopyCommand& history = found->history;
+  if (history.size != 0) needed = history.toOffset + history.size;
   for (const CopyCommand& copy : found->results)
     needed = std::max(needed, copy.toOffset + copy.size);
   if (bytes.size() < needed) {
@@ -499,7 +515,22 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
     std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
+  readHistory(bytes.subspan(history.toOffset, history.size));
   return {};
+}
+
+/// Tells which instances that are culled on the GPU have been skinned where they are shown.
+/// Versions only grow, modulo 2³², and a record that is clear has 0.
+void SceneBooks::readHistory(std::span<const std::byte> records) {
+  for (const std::uint32_t index : culled_) {
+    SceneInstance& instance = instances_.at(index);
+    const std::size_t place = index * sizeof(abi::HistoryRecord);
+    if (instance.isWritten || !instance.shown || place >= records.size()) continue;
+    abi::HistoryRecord record;
+    std::memcpy(&record, records.data() + place, sizeof(record));
+    instance.isWritten = record.version != 0 &&
+                         static_cast<std::int32_t>(record.version - instance.firstVersion) >= 0;
+  }
 }
 
 Result<std::optional<Box>> Scene::bounds(InstanceHandle handle) const {

@@ -1,6 +1,7 @@
 // Instances: how they are added, placed, changed and removed.
 
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "plan/check.h"
@@ -519,11 +520,11 @@ Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   const SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   InstanceOutput output;
-  if (!instance->shown) return output;
-  const Place& place = *instance->shown;
+  const Place& place = instance->shown ? *instance->shown : instance->target;
   const std::uint64_t offset = books.outputStore_.base + place.bytes.offset;
   const Result<VertexPlaces> places = placeVertices(instance->layout, place.vertexCount, offset);
   if (!places) return places.error();
+  output.isWritten = instance->isWritten;
   output.mesh = place.mesh;
   output.offset = offset;
   output.size = place.bytes.size;
@@ -532,6 +533,52 @@ Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   output.tangents = places->tangents;
   output.previousPositions = places->previousPositions;
   return output;
+}
+
+Result<void> Scene::indexedDraws(std::span<const InstanceHandle> instances,
+                                 std::span<const IndexRange> indices,
+                                 std::span<IndexedDraw> draws) const {
+  const SceneBooks& books = *books_;
+  if (instances.size() != draws.size()) {
+    return invalid("there are " + std::to_string(instances.size()) + " instances, but " +
+                   std::to_string(draws.size()) + " draws");
+  }
+  const VertexLayout* layout = nullptr;  // whose stride is known
+  std::uint32_t stride = 0;
+  for (std::size_t number = 0; number < instances.size(); ++number) {
+    const auto wrong = [number](ErrorCode code, const std::string& why) {
+      return Error{code, "draw " + std::to_string(number) + ": " + why};
+    };
+    const SceneInstance* instance = books.instances_.find(instances[number]);
+    if (instance == nullptr) {
+      return wrong(ErrorCode::invalidArgument,
+                   unknownHandle("instance", instances[number]).message);
+    }
+    const Place& place = instance->shown ? *instance->shown : instance->target;
+    if (place.mesh.index >= indices.size())
+      return wrong(ErrorCode::invalidArgument, "there is no range of indices for its mesh");
+    if (layout == nullptr || *layout != instance->layout) {
+      layout = &instance->layout;
+      if (layout->arrangement != Arrangement::interleaved)
+        return wrong(ErrorCode::invalidArgument, "its attributes are not interleaved");
+      const std::uint32_t own = placeVertices(*layout, 1)->positions.stride;
+      if (number != 0 && own != stride) {
+        return wrong(ErrorCode::invalidArgument, "its stride of " + std::to_string(own) +
+                                                     " bytes is not the first one, " +
+                                                     std::to_string(stride));
+      }
+      stride = own;
+    }
+    const std::uint64_t first = (books.outputStore_.base + place.bytes.offset) / stride;
+    if (first > std::numeric_limits<std::int32_t>::max()) {
+      return wrong(ErrorCode::limitExceeded,
+                   "its first vertex is number " + std::to_string(first) + " of the buffer");
+    }
+    const IndexRange& range = indices[place.mesh.index];
+    draws[number] = {range.count, instance->isWritten ? 1u : 0u, range.first,
+                     static_cast<std::int32_t>(first), static_cast<std::uint32_t>(number)};
+  }
+  return {};
 }
 
 }  // namespace dermis

@@ -183,9 +183,6 @@ std::span<const InstanceHandle> Scene::skinnedInstances() const {
 std::span<const InstanceHandle> Scene::settledInstances() const {
   return books_->settled_;
 }
-std::span<const InstanceHandle> Scene::movedInstances() const {
-  return books_->moved_;
-}
 Result<std::uint32_t> Scene::visibilityIndex(InstanceHandle instance) const {
   if (books_->instances_.find(instance) == nullptr) return unknownHandle("instance", instance);
   return instance.index;

@@ -270,7 +270,8 @@ Result<void> SceneBooks::makeFrameBuffers(const PlanData& plan) {
   }
   if (!culls && resultCopies_.empty()) return {};
   SceneBufferMemory& back = nextReadBack().buffer;  // the frame that used it last is complete
-  const BufferRequirement needed = sizes().requirement(BufferRole::readBack, 0, limits_);
+  BufferRequirement needed = sizes().requirement(BufferRole::readBack, 0, limits_);
+  needed.size += historyCopy_.size;
   return back.size < needed.size ? make(back, BufferRole::readBack, needed) : Result<void>();
 }
 

@@ -164,14 +164,21 @@ Result<SceneRecorder> SceneRecorder::create(const Context& lent,
 
 Result<BufferRequirement> SceneRecorder::requirement(const Context& context,
                                                      const SceneRecorderDescription& description,
-                                                     BufferRole role) {
+                                                     BufferRole role,
+                                                     std::span<const VertexLayout> layouts) {
   const SceneSetup setup = rounded(setupOf(description, *context.state_));
   if (Result<void> good = checkSetup(setup); !good) return good.error();
   if (static_cast<std::size_t>(role) >= bufferRoleCount)
     return notAValue("the role of the buffer", role, "BufferRole");
   BufferRequirement needed = sceneSizes(setup).requirement(role, 0, setup.limits);
-  if (role == BufferRole::positions && description.output.buffer == VK_NULL_HANDLE)
-    needed.usage |= description.outputUsage;
+  if (role != BufferRole::positions) return needed;
+  if (description.output.buffer == VK_NULL_HANDLE) needed.usage |= description.outputUsage;
+  for (const VertexLayout& layout : layouts) {
+    const Result<VertexPlaces> places = placeVertices(layout, 1);
+    if (!places) return places.error();
+    // What is before it ends at a multiple of 4 bytes.
+    needed.size += std::max<std::uint64_t>(places->alignment, 4) - 4;
+  }
   return needed;
 }
 
