@@ -55,7 +55,7 @@ endfunction()
 
 set(CPACK_COMPONENTS_ALL)
 set(depends)
-set(suggests libglm-dev)  # dermis/glm.h
+set(suggests)
 if(vulkan IN_LIST dermisComponents)
   list(APPEND depends libvulkan-dev)
 endif()

@@ -1,4 +1,4 @@
-// For an engine's own shaders: decodes the formats of skinned vertices (VertexFormat in dermis/vertex_format.h). Vertex input
+// For an engine's own shaders: decodes the formats of skinned vertices (VertexFormat in dermis/layout.h). Vertex input
 // decodes float32, float16 and snorm components itself. It reads octahedral16x2 as VK_FORMAT_R16G16_SNORM.
 #ifndef DERMIS_DECODE_GLSL
 #define DERMIS_DECODE_GLSL

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "commands.h"
-#include "dermis/normals.h"
+#include "dermis/mesh.h"
 #include "kit/device.h"
 #include "kit/file_name.h"
 #include "kit/program.h"

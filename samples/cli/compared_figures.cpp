@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "kit/device.h"
 
 namespace dermis::cli {

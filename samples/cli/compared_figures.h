@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dermis/gltf.h"
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "drawn_scene.h"
 
 namespace dermis::cli {

@@ -10,9 +10,9 @@
 #include <span>
 #include <utility>
 
-#include "dermis/cpu/skin.h"
-#include "dermis/verify/reference.h"
-#include "dermis/vulkan/kernels.h"
+#include "dermis/cpu.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
 #include "kernel_instructions.h"
 #include "kit/timed_batches.h"
 #include "scene_skinner.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "comparison_tube.h"
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "kit/device.h"
 #include "method_options.h"
 #include "skinned_scene.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "compared_figures.h"
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "kit/device.h"
 #include "kit/render/camera.h"
 #include "kit/render/picture.h"

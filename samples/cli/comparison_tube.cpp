@@ -12,7 +12,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 
 namespace dermis::cli {
 namespace {

@@ -2,7 +2,7 @@
 // can be checked against theory.
 #pragma once
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis/result.h"
 #include "method_options.h"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "skinned_scene.h"
 
 namespace dermis::cli {

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "kit/device.h"
 #include "kit/render/draw.h"
 #include "scene_skinner.h"

@@ -10,7 +10,7 @@
 #include <spirv-tools/optimizer.hpp>
 #endif
 
-#include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/context.h"
 
 #define DERMIS_STATISTICS_FUNCTIONS(X) \
   X(DestroyDevice)                     \
@@ -178,7 +178,7 @@ PipelineStatistics::~PipelineStatistics() {
   functions_->DestroyDevice(device_, nullptr);
 }
 
-// The layouts that vulkan/kernels.h describes, without the texel buffers.
+// The layouts that `PipelineDescription` describes, without the texel buffers.
 bool PipelineStatistics::createLayouts() {
   std::array<VkDescriptorSetLayoutBinding, storageBuffersWanted> bindings{};
   for (std::uint32_t binding = 0; binding < bindings.size(); ++binding) {

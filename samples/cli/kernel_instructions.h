@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/context.h"
 #include "kit/device.h"
 
 namespace dermis::cli {

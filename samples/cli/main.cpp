@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "commands.h"
-#include "dermis/version.h"
+#include "dermis/result.h"
 #include "kit/program.h"
 
 namespace {

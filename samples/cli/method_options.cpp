@@ -5,7 +5,7 @@
 #include <array>
 #include <utility>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 
 namespace dermis::cli {
 

@@ -9,8 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "dermis/centers_of_rotation.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "kit/memory_left.h"
 #include "kit/program.h"
 #include "kit/solve_centers.h"

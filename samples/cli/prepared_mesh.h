@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "dermis/gltf.h"
-#include "dermis/method.h"
-#include "dermis/pack.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
 #include "dermis/result.h"
-#include "dermis/validate.h"
 
 namespace dermis::cli {
 

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 
 namespace dermis::cli {

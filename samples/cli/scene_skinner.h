@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "kit/batch_runner.h"
 #include "skinned_scene.h"
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "dermis/method.h"
-#include "dermis/verify/accuracy.h"
+#include "dermis/layout.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 #include "kit/verification_product.h"
 #include "skinned_scene.h"

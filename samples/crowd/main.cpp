@@ -31,7 +31,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/cpu/scene_runner.h"
+#include "dermis/cpu.h"
 #include "dermis/vulkan/scene_recorder.h"
 #include "kit/batch_runner.h"
 #include "kit/buffer.h"

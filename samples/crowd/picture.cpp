@@ -9,7 +9,7 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec4.hpp>
 
-#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/drawing.h"
 #include "dermis_crowd_shaders.h"
 #include "kit/program.h"
 

@@ -20,9 +20,14 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/dermis.h"
-#include "dermis/verify/accuracy.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/scene.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 
 using namespace dermis;
 using vulkan::Use;

@@ -14,10 +14,10 @@
 #include <string_view>
 #include <vector>
 
+#include "dermis/mesh.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "dermis/types.h"
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "dermis/vulkan/context.h"
 #include "kit/buffer.h"
 #include "kit/device.h"

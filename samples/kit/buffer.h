@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dermis/result.h"
-#include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/context.h"
 #include "kit/device.h"
 
 namespace dermis::samples {

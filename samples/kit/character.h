@@ -10,9 +10,7 @@
 
 #include "dermis/gltf.h"
 #include "dermis/mesh.h"
-#include "dermis/pack.h"
 #include "dermis/result.h"
-#include "dermis/types.h"
 
 namespace dermis::samples {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "kit/in_parallel.h"
 
 namespace dermis::samples {

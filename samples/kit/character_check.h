@@ -12,10 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/handle.h"
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis/scene.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/character.h"
 #include "kit/program.h"
 

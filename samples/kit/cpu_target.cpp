@@ -4,7 +4,7 @@
 #include <map>
 #include <mutex>
 
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "kit/batch_runner.h"
 
 namespace dermis::samples {

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "dermis/result.h"
-#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
 #include "kit/device_extensions.h"
 #include "kit/vulkan_loader.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "kit/verification_product.h"
 
 namespace dermis::samples {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dermis/mesh.h"
-#include "dermis/types.h"
 
 namespace dermis::samples {
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "dermis/centers_of_rotation.h"
+#include "dermis/mesh.h"
 
 namespace dermis::samples {
 

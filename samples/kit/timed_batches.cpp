@@ -3,7 +3,7 @@
 #include <cstring>
 #include <utility>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 
 namespace dermis::samples {
 

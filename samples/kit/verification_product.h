@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 #include "kit/random_rig.h"
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <optional>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/verification_product.h"
 
 namespace dermis::samples {

@@ -17,8 +17,9 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/verify/accuracy.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 
 using namespace dermis;
 using vulkan::Use;

@@ -20,10 +20,10 @@
 #include <variant>
 #include <vector>
 
-#include "dermis/pack.h"
-#include "dermis/scene_commands.h"
-#include "dermis/verify/accuracy.h"
-#include "dermis/vulkan/kernels.h"
+#include "dermis/mesh.h"
+#include "dermis/scene.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
 
 using namespace dermis;
 
@@ -51,6 +51,8 @@ template <typename... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+template <typename... Calls>
+Overloaded(Calls...) -> Overloaded<Calls...>;  // for Clang before 17
 
 // -- The RHI. A real one would not map all buffers, nor wait for each frame.
 

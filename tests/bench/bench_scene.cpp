@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 
 namespace dermis::bench {
 namespace {

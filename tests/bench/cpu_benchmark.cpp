@@ -25,8 +25,8 @@
 #include <thread>
 #include <vector>
 
-#include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
+#include "dermis/cpu.h"
+#include "dermis/mesh.h"
 #include "kit/bench/crowd.h"
 #include "kit/random_rig.h"
 

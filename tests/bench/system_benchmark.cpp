@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bench_scene.h"
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "kit/device.h"
 #include "kit/random_rig.h"
 #include "system_engine.h"

@@ -17,10 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "dermis/pack.h"
-#include "dermis/shader_compiler.h"
-#include "dermis/validate.h"
-#include "dermis/verify/reference.h"
+#include "dermis/compilers.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "dermis/vulkan/context.h"
 #include "dermis_command.h"
 #include "glb.h"

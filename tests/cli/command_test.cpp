@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis_command.h"
 #include "kit/batch_runner.h"
 #include "ply.h"

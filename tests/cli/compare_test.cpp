@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis_command.h"
 #include "kit/method_rotation.h"
 #include "ply.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "scene_skinner.h"
 #include "test_device.h"
 

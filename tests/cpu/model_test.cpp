@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cpu_engine.h"
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "model_steps.h"
 
 namespace dermis::test {

@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
+#include "dermis/cpu.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 namespace {

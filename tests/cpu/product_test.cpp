@@ -2,8 +2,8 @@
 
 #include "verify_product.h"
 
-#include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
+#include "dermis/cpu.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "cpu_engine.h"
-#include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
+#include "dermis/cpu.h"
+#include "dermis/mesh.h"
 #include "random_rig.h"
 
 namespace dermis::test {

@@ -11,10 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "dermis/cpu/skin.h"
-#include "dermis/pack.h"
-#include "dermis/verify/accuracy.h"
-#include "dermis/verify/reference.h"
+#include "dermis/cpu.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "random_rig.h"
 
 namespace dermis::test {

@@ -15,12 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "dermis/cpu/scene_runner.h"
+#include "dermis/cpu.h"
 #include "dermis/gltf.h"
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/scene.h"
-#include "dermis/validate.h"
-#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/drawing.h"
 #include "test_paths.h"
 
 using namespace dermis;

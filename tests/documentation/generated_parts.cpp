@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis/plan.h"
 #include "run_command.h"
 #include "scene/states.h"

@@ -1,8 +1,7 @@
 // libFuzzer: any bytes as a glTF file, without a folder, so that no file is opened. What loads is
 // sampled, viewed, and packed or repaired as well, and its clips are added to itself.
 #include <dermis/gltf.h>
-#include <dermis/pack.h>
-#include <dermis/validate.h>
+#include <dermis/mesh.h>
 
 #include <algorithm>
 #include <cstddef>

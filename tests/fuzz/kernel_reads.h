@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 
 namespace dermis::fuzz {
 

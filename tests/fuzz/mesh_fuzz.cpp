@@ -19,10 +19,8 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/bounds.h"
-#include "dermis/pack.h"
-#include "dermis/validate.h"
-#include "dermis/verify/reference.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "kernel_reads.h"
 
 using namespace dermis;

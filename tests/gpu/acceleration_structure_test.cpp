@@ -1,7 +1,7 @@
 // Acceleration structures that are built from skinned positions, and refitted from pose to pose, in
 // the command buffer that skins; rays tell that they hold what was skinned.
 
-#include "dermis/vulkan/acceleration_structure.h"
+#include "dermis/vulkan/drawing.h"
 
 #include <gtest/gtest.h>
 
@@ -19,10 +19,10 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/plan.h"
-#include "dermis/verify/reference.h"
-#include "dermis/vulkan/barrier.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
 #include "kit/buffer.h"
 #include "random_rig.h"
 #include "ray_tracing.h"

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "dermis/pack.h"
-#include "dermis/verify/accuracy.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "inexact_context.h"
 #include "kit/batch_runner.h"
 #include "test_device.h"

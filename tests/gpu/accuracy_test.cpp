@@ -12,8 +12,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "dermis/pack.h"
-#include "dermis/verify/accuracy.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"

@@ -7,8 +7,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "dermis/cpu/scene_runner.h"
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "kit/device.h"
 #include "system_test.h"
 

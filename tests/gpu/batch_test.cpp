@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"

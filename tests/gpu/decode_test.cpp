@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "dermis_test_shaders.h"
 #include "kit/batch_runner.h"
 #include "kit/buffer.h"

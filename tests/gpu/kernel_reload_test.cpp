@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
 #include "kit/batch_runner.h"
 #include "plan/variant.h"
 #include "shader_folder.h"
@@ -33,6 +33,7 @@ class KernelReloadTest : public SystemTest {
     // [/create]
   }
 
+  PipelineId helper(Kernel kernel) const;
   KernelReload reload() {
     ++frame_;
     return must(compiler_->reload(*context_, frame_, frame_ - 1));
@@ -120,8 +121,15 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
   EXPECT_EQ(skin(), original);
 }
 
+/// The pipeline of a kernel that needs nothing but its name.
+PipelineId KernelReloadTest::helper(Kernel kernel) const {
+  return Variant{.kernel = kernel,
+                 .oneOutput = context_->limits().maxStorageBuffersPerStage < storageBuffersWanted}
+      .id();
+}
+
 TEST_F(KernelReloadTest, AFileThatIsMissingForAWhileOrOfAnotherVersionIsNotUsed) {
-  const PipelineId palette = Variant{.kernel = Kernel::palette}.id();
+  const PipelineId palette = helper(Kernel::palette);
   must(context_->prepare({&palette, 1}));
   static_cast<void>(reload());
   std::filesystem::rename(folder_->path() / "polar.glsl", folder_->path() / "polar");
@@ -142,11 +150,11 @@ TEST_F(KernelReloadTest, AFileThatIsWrittenDuringItsFirstCompilationIsReadAgain)
   const auto now = fs::file_time_type::clock::now();
   for (const auto& file : fs::directory_iterator(folder_->path()))
     fs::last_write_time(file, now - std::chrono::hours(1));
-  const PipelineId clear = Variant{.kernel = Kernel::clear}.id();
+  const PipelineId clear = helper(Kernel::clear);
   must(context_->prepare({&clear, 1}));
   EXPECT_EQ(reload().changed, 0u);
   fs::last_write_time(folder_->path() / "palette.comp", now + std::chrono::hours(1));
-  const PipelineId palette = Variant{.kernel = Kernel::palette}.id();
+  const PipelineId palette = helper(Kernel::palette);
   must(context_->prepare({&palette, 1}));
   EXPECT_EQ(reload().changed, 1u);
   EXPECT_EQ(reload().changed, 0u);

@@ -14,8 +14,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 
-#include "dermis/glm.h"
-#include "dermis/verify/accuracy.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "dual_quat.h"
 #include "exhaustive.h"
 #include "joint_of.h"
@@ -476,7 +476,7 @@ TEST_F(SomeMethodsTest, Truth07_IterativeBlendingOfTwoJointsIsTheScrewBetweenThe
     const std::vector<JointMatrix> pose = randomPose(30 + seed, 2, Rigidity::rigid);
     const samples::SkinnedVertices skinned = skin(mesh, pose, Method::dualQuaternionIterative);
     const auto transform = [&pose](std::size_t joint) {
-      return normalize(fromRigidMatrix(glm::dmat4x3(toGlm(pose[joint]))));
+      return normalize(fromRigidMatrix(glm::dmat4x3(toColumns<glm::mat4x3>(pose[joint]))));
     };
     for (std::uint32_t step = 0; step < steps; ++step) {
       const DualQuatd between = screwInterpolate(transform(0), transform(1),

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "dermis/bounds.h"
-#include "dermis/verify/reference.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "intercepted_device.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"

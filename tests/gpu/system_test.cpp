@@ -2,8 +2,7 @@
 
 #include <cstring>
 
-#include "dermis/verify/accuracy.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/batch_runner.h"
 #include "verify/joint.h"
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/vulkan/scene_recorder.h"
 #include "random_rig.h"
 #include "scene_meshes.h"

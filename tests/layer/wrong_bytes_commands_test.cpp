@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis_command.h"
 #include "wrong_bytes.h"
 

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/pack.h"
-#include "dermis/verify/reference.h"
+#include "dermis/mesh.h"
+#include "dermis/verify.h"
 #include "kit/device.h"
 #include "kit/verification_product.h"
 #include "random_rig.h"

@@ -7,7 +7,7 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "mock_batch.h"
 
 namespace dermis::test {

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
 #include "plan/variant.h"
@@ -355,6 +356,20 @@ TEST(ContextTest, APipelineThatNeedsAFeatureIsRefusedWithoutIt) {
   EXPECT_NE(prepared.error().message.find("scalarBlockLayout"), std::string::npos);
   EXPECT_TRUE(mock.modules.empty()) << "a module needs the feature, too";
   EXPECT_EQ(mock.alive["Pipeline"], 0);
+}
+
+TEST(ContextTest, APipelineOfARicherDeviceIsRefused) {
+  MockVulkan mock;
+  mock.limits.maxPerStageDescriptorStorageBuffers = 4;
+  const vulkan::Context context = *vulkan::Context::create(mock.description());
+  for (const bool oneOutput : {false, true}) {
+    const PipelineId id = Variant{.oneOutput = oneOutput}.id();
+    const Result<void> prepared = context.prepare({&id, 1});
+    ASSERT_EQ(prepared.ok(), oneOutput);
+    if (!oneOutput) {
+      EXPECT_EQ(prepared.error().code, ErrorCode::missingFeature);
+    }
+  }
 }
 
 // ---- Kernels as data

@@ -9,7 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "core_plan_simulation.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "mock_vulkan.h"
 
 namespace dermis::test {

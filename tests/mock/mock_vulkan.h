@@ -12,7 +12,6 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "dermis/vulkan/barrier.h"
 #include "dermis/vulkan/context.h"
 
 namespace dermis::test {

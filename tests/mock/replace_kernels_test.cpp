@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
 #include "plan/variant.h"

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
 #include "plan_commands.h"

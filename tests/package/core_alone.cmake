@@ -9,7 +9,6 @@ endforeach()
 
 list(TRANSFORM coreSources PREPEND "${coreFolder}/")
 file(GLOB headers "${sourceFolder}/engine/include/dermis/*.h")
-list(FILTER headers EXCLUDE REGEX "/runtime_compiler.h$")  # needs a Context
 file(GLOB_RECURSE privateHeaders "${sourceFolder}/engine/src/core/*.h")
 # Only preprocesses, which finds #error; the build compiles the headers.
 set(preprocessing ${flags})

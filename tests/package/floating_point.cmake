@@ -20,9 +20,9 @@ if(status EQUAL 0 OR NOT printed MATCHES "Dermis: compile for SSE2")
   wrong("validate.cpp compiled, or failed for another reason:\n${printed}")
 endif()
 run(ignored "Compile a program of an engine for it" "${ownCompiler}" ${flags} ${x87} -include
-    "${sourceFolder}/engine/include/dermis/dermis.h" -x c++ /dev/null)
+    "${sourceFolder}/engine/include/dermis/scene.h" -x c++ /dev/null)
 run(ignored "Compile a program of an engine with -ffast-math" "${ownCompiler}" ${flags} -ffast-math -include
-    "${sourceFolder}/engine/include/dermis/dermis.h" -x c++ /dev/null)
+    "${sourceFolder}/engine/include/dermis/scene.h" -x c++ /dev/null)
 run(ignored "Compile without" "${ownCompiler}" ${flags} "${coreFolder}/validate.cpp")
 
 say("Look for sources that compute and do not refuse these flags")

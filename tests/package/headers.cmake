@@ -2,13 +2,9 @@
 # compiled.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
-set(core dermis/dermis.h dermis/cpu/scene_runner.h dermis/verify/accuracy.h dermis/verify/reference.h dermis/gltf.h
-    dermis/shader_compiler.h)
-set(vulkan dermis/vulkan/vulkan.h)
-if(runtimeCompiler)
-  list(APPEND vulkan dermis/runtime_compiler.h)
-endif()
-set(loaders dermis/vulkan/vertex_input.h dermis/vulkan/acceleration_structure.h)
+set(core dermis/mesh.h dermis/scene.h dermis/cpu.h dermis/verify.h dermis/gltf.h dermis/compilers.h)
+set(vulkan dermis/vulkan/context.h dermis/vulkan/scene_recorder.h)
+set(loaders dermis/vulkan/drawing.h)
 set(create "int main() { return static_cast<int>(vkCreateInstance(nullptr, nullptr, nullptr)); }")
 
 # compiles(WHAT BODY HEADERS...): a "-DX" among the headers is a definition.
@@ -40,16 +36,15 @@ compiles("Xlib last" "" ${core} ${vulkan} ${loaders} X11/Xlib.h)
 compiles("macros of windows.h" "" algorithm array bit cmath cstddef cstdint filesystem functional limits memory optional span string
          string_view utility variant vector vulkan/vulkan.h windows_macros.h ${core} ${vulkan} ${loaders})
 
-# Only dermis/glm.h needs GLM. The dependencies of Dermis' sources must not be dependencies of its headers.
+# The dependencies of Dermis' sources must not be dependencies of its headers.
 say("Look at what the public headers include")
 file(GLOB_RECURSE public RELATIVE "${prefix}/${includeFolder}" "${prefix}/${includeFolder}/dermis/*.h")
-list(REMOVE_ITEM public dermis/glm.h)
 set(text)
 foreach(header IN LISTS public)
   string(APPEND text "#include <${header}>\n")
 endforeach()
 file(WRITE "${testFolder}/${NAME}.cpp" "${text}")
 run(files "List it" "${ownCompiler}" -std=c++20 -M -I "${prefix}/${includeFolder}" "${testFolder}/${NAME}.cpp")
-if(NOT files MATCHES "dermis/dermis[.]h" OR files MATCHES "/(glm|hwy|glslang|spirv-tools|nlohmann)/|tiny_gltf[.]h")
+if(NOT files MATCHES "dermis/mesh[.]h" OR files MATCHES "/(glm|hwy|glslang|spirv-tools|nlohmann)/|tiny_gltf[.]h")
   wrong("they include ${CMAKE_MATCH_0}:\n${files}")
 endif()

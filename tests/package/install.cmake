@@ -29,9 +29,6 @@ file(GLOB_RECURSE documents RELATIVE "${sourceFolder}" "${sourceFolder}/docs/*" 
 list(TRANSFORM documents PREPEND ${dataFolder}/doc/dermis/)
 list(APPEND expected ${documents})
 file(GLOB_RECURSE headers RELATIVE "${sourceFolder}/engine/include" "${sourceFolder}/engine/include/*.h")
-if(NOT runtimeCompiler)
-  list(REMOVE_ITEM headers dermis/runtime_compiler.h)
-endif()
 list(TRANSFORM headers PREPEND ${includeFolder}/)
 file(GLOB_RECURSE shaders RELATIVE "${sourceFolder}/shaders" "${sourceFolder}/shaders/*.h" "${sourceFolder}/shaders/*.glsl"
      "${sourceFolder}/shaders/*.comp")

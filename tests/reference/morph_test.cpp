@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "reference_rig.h"
 
 namespace dermis::test {

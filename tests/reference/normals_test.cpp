@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "reference_rig.h"
 
 namespace dermis::test {

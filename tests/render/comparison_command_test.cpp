@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis_command.h"
 #include "pictures.h"
 #include "test_paths.h"

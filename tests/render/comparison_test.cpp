@@ -13,7 +13,7 @@
 
 #include "compared_figures.h"
 #include "comparison_picture.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "drawing_device.h"
 #include "kit/render/draw.h"
 #include "kit/render/renderer.h"

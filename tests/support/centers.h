@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/centers_of_rotation.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "dermis/vulkan/buffer_callbacks.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
 #include "scene_meshes.h"

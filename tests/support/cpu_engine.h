@@ -8,8 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "dermis/cpu/scene_runner.h"
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "scene_meshes.h"
 
 namespace dermis::test {

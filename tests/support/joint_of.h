@@ -4,7 +4,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/scene_commands.h"
+#include "dermis/scene.h"
 #include "plan/plan_data.h"
 #include "plan_commands.h"
 #include "scene/books.h"

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <utility>
 
-#include "dermis/shader_compiler.h"
-#include "dermis/vulkan/acceleration_structure.h"
+#include "dermis/compilers.h"
+#include "dermis/vulkan/drawing.h"
 
 namespace dermis::test {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <map>
 
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
 
 namespace dermis::test {
 namespace {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/scene.h"
 #include "random_rig.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
 
 namespace dermis::test {
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "dermis/scene.h"
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "dermis/vulkan/scene_recorder.h"
 #include "kit/buffer.h"
 #include "kit/device.h"

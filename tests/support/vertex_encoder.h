@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/types.h"
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 

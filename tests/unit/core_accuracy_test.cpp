@@ -1,6 +1,6 @@
 // The accuracy contract: the bounds of TRUTHS.md, and a comparison that misses nothing.
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "dermis/bounds.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -18,8 +18,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "dermis/verify/accuracy.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "joint_of.h"
 #include "random_rig.h"
 

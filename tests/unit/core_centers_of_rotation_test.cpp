@@ -1,6 +1,6 @@
 // Centres of rotation against the formula itself, summed over all triangles without an index.
 
-#include "dermis/centers_of_rotation.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,6 @@
 
 #include "centers.h"
 #include "centers/pair_index.h"
-#include "dermis/types.h"
 #include "kit/solve_centers.h"
 #include "random_rig.h"
 

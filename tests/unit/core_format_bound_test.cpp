@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "verify/conditioning.h"
 #include "vertex_encoder.h"
 

@@ -7,9 +7,15 @@
 #include <type_traits>
 #include <vector>
 
+#include <glm/mat4x3.hpp>
+#include <glm/mat4x4.hpp>
+
 #include "abi.h"
-#include "dermis/dermis.h"
-#include "dermis/glm.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/scene.h"
 
 namespace dermis::test {
 namespace {
@@ -57,7 +63,7 @@ TEST(Mesh, GlmMatricesAreTransposedOnTheWay) {
     for (int row = 0; row < 3; ++row) matrix[column][row] = static_cast<float>(10 * row + column);
   }
   const JointMatrix joint = toJointMatrix(matrix);
-  const glm::mat4x3 back = toGlm(joint);
+  const glm::mat4x3 back = toColumns<glm::mat4x3>(joint);
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 3; ++row) {
       EXPECT_EQ(joint.m[row][column], static_cast<float>(10 * row + column));

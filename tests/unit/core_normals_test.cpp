@@ -1,5 +1,5 @@
 // Normals for meshes that have none.
-#include "dermis/normals.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -12,8 +12,7 @@
 #include <vector>
 
 #include "core_blob.h"
-#include "dermis/pack.h"
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "random_rig.h"
 
 namespace dermis::test {

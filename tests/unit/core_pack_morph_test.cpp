@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "core_pack_meshes.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 
 namespace dermis::test {
 namespace {

@@ -1,6 +1,6 @@
 // pack: what it stores for every vertex. The blob is read by the words of shaders/abi.h.
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // pack: pivots, and weights that sum to exactly 1.
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Stored packed meshes: what fromBytes takes, and everything that it refuses.
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 

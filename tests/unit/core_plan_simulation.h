@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/plan.h"
 
 namespace dermis::test {

@@ -13,9 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/pack.h"
-#include "dermis/types.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "random_rig.h"
 
 namespace dermis::test {

@@ -1,5 +1,5 @@
 // Names from files in messages: short, on one line, and nothing in them that a terminal obeys.
-#include <dermis/validate.h>
+#include <dermis/mesh.h>
 #include <gtest/gtest.h>
 #include "core/text.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "random_rig.h"
 
 namespace dermis::test {

@@ -1,6 +1,6 @@
 // validate: every kind of problem, with its count, its first place and a sentence that names it.
 
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "dermis/types.h"
 #include "random_rig.h"
 
 namespace dermis::test {

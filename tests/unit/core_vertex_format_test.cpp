@@ -1,7 +1,7 @@
 // The formats of skinned vertices: what each is called, where it may be used, and what its bytes
 // stand for.
 
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
 
 #include <gtest/gtest.h>
 

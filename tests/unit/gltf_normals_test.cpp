@@ -1,5 +1,5 @@
 // Normals that are computed for primitives without: glTF 2.0, 3.7.2.1.
-#include <dermis/pack.h>
+#include <dermis/mesh.h>
 
 #include <cmath>
 #include <cstdint>

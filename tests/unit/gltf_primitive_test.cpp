@@ -1,5 +1,5 @@
 // Primitives: influences, triangles, the formats each attribute may have.
-#include <dermis/validate.h>
+#include <dermis/mesh.h>
 
 #include <algorithm>
 #include <limits>

@@ -5,7 +5,7 @@
 // validator.mjs, which show what three.js and the glTF validator make of them.
 #include "gltf_rules.h"
 
-#include <dermis/validate.h>
+#include <dermis/mesh.h>
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
 #include "dermis_kernels.h"
 #include "dermis_kernels_recipes.h"
 #include "test_paths.h"

@@ -1,7 +1,8 @@
 // Kernels compiled at run time: the same as those in the library, kept on disk, and what is
 // refused.
 
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
+#include "dermis/vulkan/context.h"
 
 #include <gtest/gtest.h>
 

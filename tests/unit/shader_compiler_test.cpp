@@ -1,4 +1,4 @@
-#include "dermis/shader_compiler.h"
+#include "dermis/compilers.h"
 
 #include <gtest/gtest.h>
 

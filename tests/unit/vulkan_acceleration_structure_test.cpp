@@ -1,6 +1,6 @@
 // Skinned positions as the input of an acceleration-structure build: formats, alignment, boxes.
 
-#include "dermis/vulkan/acceleration_structure.h"
+#include "dermis/vulkan/drawing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Vertex input made from a layout: what a graphics pipeline reads is what the kernels wrote.
 
-#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/drawing.h"
 
 #include <gtest/gtest.h>
 

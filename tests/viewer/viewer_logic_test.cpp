@@ -10,7 +10,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "interface.h"
 #include "scene_view.h"
 #include "test_paths.h"

@@ -22,10 +22,8 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/export.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
-#include "dermis/types.h"
 
 namespace dermis::gltf {
 
@@ -262,7 +260,7 @@ struct Model {
   std::uint64_t memoryLeft = 0;
 };
 
-/// What `load` computes for primitives that have triangles and no normals (normals.h).
+/// What `load` computes for primitives that have triangles and no normals.
 enum class MissingNormals : std::uint8_t {
   leave = 0,   ///< nothing: the primitive has no normals
   smooth = 1,  ///< smooth normals; its vertices stay

@@ -1,6 +1,6 @@
 // Turns a batch of instances into commands, on the CPU, without Vulkan. An engine passes the plan
 // to `vulkan::Context::record`, or issues the commands with its own RHI. To do so it also needs
-// vulkan/kernels.h (of dermis::vulkan) and shaders/abi.h.
+// `vulkan::pipelineDescription` and shaders/abi.h.
 #pragma once
 
 #include <array>
@@ -12,14 +12,9 @@
 #include <variant>
 #include <vector>
 
-#include "dermis/export.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
-#include "dermis/method.h"
-#include "dermis/pack.h"
 #include "dermis/result.h"
-#include "dermis/types.h"
-#include "dermis/vertex_format.h"
 
 namespace dermis {
 
@@ -109,7 +104,7 @@ struct Job {
   OutputAttribute normals;    ///< unit length; the mesh must have normals
   OutputAttribute tangents;   ///< unit length; the mesh must have tangents
   /// The box that snorm16 positions are relative to: one of the engine's, or `skinnedBounds` of the
-  /// pose (bounds.h). It must be finite, and each side longer than 1e-38.
+  /// pose. It must be finite, and each side longer than 1e-38.
   Box box;
 
   /// Active morph targets, in any order, each once. Weights of 0 are skipped. `makePlan` copies
@@ -191,7 +186,7 @@ inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
 /// A compute pipeline: one of Dermis' kernels with values for its specialization constants. The
 /// number is the same in every process that uses this version of Dermis. `Context::prepare` builds
-/// pipelines; an engine with its own RHI asks `pipelineDescription` (vulkan/kernels.h).
+/// pipelines; an engine with its own RHI asks `vulkan::pipelineDescription`.
 enum class PipelineId : std::uint64_t {};
 
 /// All pipelines that a job like this one can need, with any mesh, pose and morph targets, in any
@@ -378,7 +373,7 @@ class DERMIS_CORE_API Plan {
   /// The commands, in the order in which they must be issued: the palette and clear kernels if
   /// there is anything to convert or clear, then the skin kernels, with a barrier before the first
   /// that needs it. The engine records the barriers between these commands and its own use of the
-  /// output (vulkan/barrier.h).
+  /// output (`vulkan::barrierBetween`).
   std::span<const Command> commands() const;
   /// The pipelines of the dispatches, each once. `Context::prepare` must have built them.
   std::span<const PipelineId> pipelines() const;

@@ -1,4 +1,4 @@
-// Errors as values: no exception crosses the interface of Dermis.
+// Errors as values, the version, and the export macros of shared libraries.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,63 @@
 #include <utility>
 #include <variant>
 
-#include "dermis/export.h"
+// ---- Export macros of the shared libraries, one for each library. If DERMIS_SHARED is defined, a
+// declaration with the macro is exported while that library is compiled, and imported elsewhere;
+// everything else is hidden. The CMake targets and dermis.pc of a shared build define
+// DERMIS_SHARED. In a static build the macros are empty, so a plugin that links Dermis exports
+// nothing of it.
+
+/// @cond
+#if !defined(DERMIS_SHARED)
+#define DERMIS_EXPORTED
+#define DERMIS_IMPORTED
+#elif defined(_WIN32)
+#define DERMIS_EXPORTED __declspec(dllexport)
+#define DERMIS_IMPORTED __declspec(dllimport)
+#else
+#define DERMIS_EXPORTED __attribute__((visibility("default")))
+#define DERMIS_IMPORTED __attribute__((visibility("default")))
+#endif
+
+// DERMIS_BUILDS_... is defined while the sources of that library are compiled.
+#if defined(DERMIS_BUILDS_CORE)
+#define DERMIS_CORE_API DERMIS_EXPORTED
+#else
+#define DERMIS_CORE_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_CPU)
+#define DERMIS_CPU_API DERMIS_EXPORTED
+#else
+#define DERMIS_CPU_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_VERIFY)
+#define DERMIS_VERIFY_API DERMIS_EXPORTED
+#else
+#define DERMIS_VERIFY_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_VULKAN)
+#define DERMIS_VULKAN_API DERMIS_EXPORTED
+#else
+#define DERMIS_VULKAN_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_SHADER_COMPILER)
+#define DERMIS_SHADER_COMPILER_API DERMIS_EXPORTED
+#else
+#define DERMIS_SHADER_COMPILER_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_RUNTIME_COMPILER)
+#define DERMIS_RUNTIME_COMPILER_API DERMIS_EXPORTED
+#else
+#define DERMIS_RUNTIME_COMPILER_API DERMIS_IMPORTED
+#endif
+#if defined(DERMIS_BUILDS_GLTF)
+#define DERMIS_GLTF_API DERMIS_EXPORTED
+#else
+#define DERMIS_GLTF_API DERMIS_IMPORTED
+#endif
+/// @endcond
+
+// ---- Errors as values: no exception crosses the interface of Dermis.
 
 namespace dermis {
 
@@ -122,5 +178,47 @@ class [[nodiscard]] Result<void> {
  private:
   std::optional<Error> error_;
 };
+
+}  // namespace dermis
+
+// ---- The version of these headers and of the library that is used at run time. CMake reads the
+// version from here.
+
+/// Changes if the interface breaks.
+#define DERMIS_VERSION_MAJOR 0
+/// Changes if the interface grows. While the major version is 0: also if it breaks.
+#define DERMIS_VERSION_MINOR 1
+/// Changes if only the implementation changes.
+#define DERMIS_VERSION_PATCH 0
+
+namespace dermis {
+
+/// A version number.
+struct Version {
+  std::uint32_t major = 0, minor = 0, patch = 0;
+
+  friend constexpr bool operator==(const Version&, const Version&) = default;
+};
+
+/// The version of the headers that the program was compiled with.
+inline constexpr Version headerVersion{DERMIS_VERSION_MAJOR, DERMIS_VERSION_MINOR,
+                                       DERMIS_VERSION_PATCH};
+
+/// The version of the library that the program was linked with or has loaded.
+DERMIS_CORE_API Version libraryVersion();
+
+/// Whether a library of version `library` has the interface that headers of version `headers`
+/// declare. The major versions must be equal. If they are 0, the minor versions must be equal, too;
+/// otherwise the minor version of the library must not be lower.
+constexpr bool isCompatible(const Version& headers, const Version& library) {
+  if (headers.major != library.major) return false;
+  return headers.major == 0 ? headers.minor == library.minor : headers.minor <= library.minor;
+}
+
+/// Whether the library that is used at run time has the interface of the headers that the caller
+/// was compiled with. A program that loads Dermis as a shared library calls this first.
+inline bool libraryFitsHeaders() {
+  return isCompatible(headerVersion, libraryVersion());
+}
 
 }  // namespace dermis

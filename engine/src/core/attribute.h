@@ -9,7 +9,6 @@
 #include <cstring>
 
 #include "dermis/mesh.h"
-#include "dermis/types.h"
 
 namespace dermis {
 

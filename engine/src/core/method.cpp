@@ -1,4 +1,4 @@
-#include "dermis/method.h"
+#include "dermis/layout.h"
 
 namespace dermis {
 

@@ -1,4 +1,4 @@
-#include "dermis/normals.h"
+#include "dermis/mesh.h"
 
 #include <array>
 #include <cmath>

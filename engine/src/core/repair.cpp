@@ -2,8 +2,7 @@
 #include <cmath>
 
 #include "attribute.h"
-#include "dermis/types.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "strict_floating_point.h"
 
 namespace dermis {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "dermis/export.h"
+#include "dermis/result.h"
 
 namespace dermis {
 

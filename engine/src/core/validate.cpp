@@ -1,4 +1,4 @@
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,6 @@
 
 #include "attribute.h"
 #include "check_mesh.h"
-#include "dermis/types.h"
 #include "strict_floating_point.h"
 #include "text.h"
 

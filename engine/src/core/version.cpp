@@ -1,4 +1,4 @@
-#include "dermis/version.h"
+#include "dermis/result.h"
 
 namespace dermis {
 

@@ -1,4 +1,4 @@
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "cpu/simd_inl.h"
 #include "cpu/task.h"
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {

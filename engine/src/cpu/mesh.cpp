@@ -1,4 +1,4 @@
-#include "dermis/cpu/mesh.h"
+#include "dermis/cpu.h"
 
 #include <algorithm>
 #include <bit>

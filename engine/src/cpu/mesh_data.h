@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/cpu/mesh.h"
+#include "dermis/cpu.h"
 #include "dermis/mesh.h"
-#include "dermis/pack.h"
 
 namespace dermis::cpu {
 

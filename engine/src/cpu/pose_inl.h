@@ -11,7 +11,7 @@
 #include "cpu/mesh_data.h"
 #include "cpu/polar.h"
 #include "cpu/simd_inl.h"
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {

@@ -1,6 +1,6 @@
 // Runs a Scene on the CPU: divides the work of each frame into jobs.
 
-#include "dermis/cpu/scene_runner.h"
+#include "dermis/cpu.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,6 @@
 
 #include "abi.h"
 #include "cpu/task.h"
-#include "dermis/cpu/skin.h"
 #include "plan/check.h"
 #include "plan/work.h"
 #include "scene/books.h"

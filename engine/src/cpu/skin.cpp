@@ -1,6 +1,6 @@
 // Checks of a job, and code that does not depend on instruction sets.
 
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 
 #include <algorithm>
 #include <string>

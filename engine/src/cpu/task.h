@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cpu/mesh_data.h"
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 
 namespace dermis::cpu {
 

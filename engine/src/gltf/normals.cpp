@@ -1,5 +1,5 @@
 // Normals for primitives that have none.
-#include "dermis/normals.h"
+#include "dermis/mesh.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
 
 #include <algorithm>
 #include <chrono>
@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "abi_text.h"
-#include "dermis/shader_compiler.h"
+#include "dermis/vulkan/context.h"
 #include "dermis_kernels_recipes.h"
 
 namespace dermis {

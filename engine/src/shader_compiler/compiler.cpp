@@ -7,7 +7,7 @@
 #include <set>
 #include <string_view>
 
-#include "dermis/shader_compiler.h"
+#include "dermis/compilers.h"
 #include "shader_compiler/cache.h"
 #include "shader_compiler/file_io.h"
 #include "shader_compiler/glslang_front_end.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "dermis/compilers.h"
 #include "dermis/result.h"
-#include "dermis/shader_compiler.h"
 #include "shader_compiler/include_resolver.h"
 
 namespace dermis {

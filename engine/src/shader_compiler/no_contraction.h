@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "dermis/export.h"
 #include "dermis/result.h"
 
 namespace dermis {

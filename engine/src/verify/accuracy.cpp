@@ -1,4 +1,4 @@
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 
 #include <algorithm>
 #include <cmath>

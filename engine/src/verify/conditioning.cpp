@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dermis/verify/accuracy.h"
+#include "dermis/verify.h"
 #include "strict_floating_point.h"
 
 namespace dermis::reference {

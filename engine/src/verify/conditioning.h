@@ -5,11 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "dermis/layout.h"
 #include "dermis/mesh.h"
-#include "dermis/method.h"
 #include "dermis/result.h"
-#include "dermis/types.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 
 namespace dermis::reference {
 

@@ -5,7 +5,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "verify/rigid.h"
 
 namespace dermis::reference {

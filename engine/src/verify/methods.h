@@ -9,7 +9,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "verify/bind_vertex.h"
 #include "verify/conditioning.h"
 #include "verify/joint.h"

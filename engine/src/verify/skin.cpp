@@ -1,4 +1,4 @@
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/text.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "strict_floating_point.h"
 #include "verify/bind_vertex.h"
 #include "verify/conditioning.h"

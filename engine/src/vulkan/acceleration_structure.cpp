@@ -1,4 +1,4 @@
-#include "dermis/vulkan/acceleration_structure.h"
+#include "dermis/vulkan/drawing.h"
 
 #include <cmath>
 #include <cstddef>

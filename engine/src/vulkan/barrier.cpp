@@ -1,4 +1,4 @@
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 
 #include <vulkan/vulkan_core.h>
 

@@ -1,4 +1,4 @@
-#include "dermis/vulkan/bindings.h"
+#include "dermis/vulkan/context.h"
 
 #include <algorithm>
 #include <array>

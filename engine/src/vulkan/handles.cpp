@@ -1,5 +1,5 @@
-// handles.h declares what vulkan_core.h declares: this file compiles only if both agree.
-#include "dermis/vulkan/handles.h"
+// context.h declares what vulkan_core.h declares: this file compiles only if both agree.
+#include "dermis/vulkan/context.h"
 
 #include <vulkan/vulkan_core.h>
 

@@ -1,4 +1,4 @@
-#include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/context.h"
 
 #include <cstddef>
 #include <string>

@@ -17,7 +17,12 @@ namespace {
 Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
   if (variant.texels && !limits.texelBuffers) {
     return Error{ErrorCode::missingFeature,
-                 "a variant that reads texel buffers needs scalarBlockLayout and shaderInt64"};
+                 "a pipeline that reads texel buffers needs scalarBlockLayout and shaderInt64"};
+  }
+  if (!variant.oneOutput && limits.maxStorageBuffersPerStage < storageBuffersWanted) {
+    return Error{ErrorCode::missingFeature,
+                 "the pipeline needs " + std::to_string(storageBuffersWanted) +
+                     " storage buffers per stage: it was listed for the limits of another device"};
   }
   return {};
 }

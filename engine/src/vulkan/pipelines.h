@@ -12,7 +12,7 @@
 
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "dermis/vulkan/kernels.h"
+#include "dermis/vulkan/context.h"
 #include "plan/variant.h"
 #include "vulkan/dispatch_table.h"
 

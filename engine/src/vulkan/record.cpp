@@ -5,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "plan/placement.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"

@@ -12,7 +12,6 @@
 #include <vulkan/vulkan_core.h>
 
 #include "abi.h"
-#include "dermis/vulkan/bindings.h"
 #include "dermis/vulkan/context.h"
 #include "vulkan/dispatch_table.h"
 #include "vulkan/pipelines.h"

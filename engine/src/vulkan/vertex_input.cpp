@@ -1,4 +1,4 @@
-#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/drawing.h"
 
 #include <string>
 #include <utility>

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/result.h"
 #include "kit/batch_runner.h"
 

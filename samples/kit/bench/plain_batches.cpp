@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "dermis/vulkan/barrier.h"
+#include "dermis/vulkan/context.h"
 #include "plain_kernels.h"
 
 namespace dermis::samples {

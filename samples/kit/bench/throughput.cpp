@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "dermis/cpu/skin.h"
+#include "dermis/cpu.h"
 #include "kit/bench/plain_batches.h"
 #include "kit/in_parallel.h"
 #include "kit/timed_batches.h"

@@ -6,7 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 
 namespace dermis::samples::render {
 

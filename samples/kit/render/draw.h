@@ -7,8 +7,8 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "dermis/types.h"
-#include "dermis/vertex_format.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
 #include "kit/buffer.h"
 
 namespace dermis::samples::render {

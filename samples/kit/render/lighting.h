@@ -8,7 +8,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "kit/render/camera.h"
 #include "kit/render/image.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/vulkan/vertex_input.h"
+#include "dermis/vulkan/drawing.h"
 #include "dermis_render_shaders.h"
 #include "kit/render/lighting.h"
 #include "kit/render/target.h"

@@ -8,7 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/in_parallel.h"
 #include "kit/program.h"
 

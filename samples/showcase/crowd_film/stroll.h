@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "flight.h"
 #include "gait.h"
 #include "kit/character.h"

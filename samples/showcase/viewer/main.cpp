@@ -11,7 +11,7 @@
 #include "viewer.h"
 
 #ifdef DERMIS_RUNTIME_COMPILER
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
 #endif
 
 namespace {

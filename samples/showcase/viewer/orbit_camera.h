@@ -3,7 +3,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "kit/render/camera.h"
 
 namespace dermis::viewer {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
 #include "kit/text.h"
 #include "vulkan_helpers.h"
 

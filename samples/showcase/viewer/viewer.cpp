@@ -13,7 +13,7 @@
 #include "kit/output_file.h"
 
 #ifdef DERMIS_RUNTIME_COMPILER
-#include "dermis/runtime_compiler.h"
+#include "dermis/compilers.h"
 #endif
 
 namespace dermis::viewer {

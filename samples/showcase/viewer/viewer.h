@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "interface.h"
 #include "kit/program.h"
 #include "window.h"

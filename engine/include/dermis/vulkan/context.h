@@ -1,21 +1,230 @@
-// Uses the engine's Vulkan device: builds pipelines, binds the engine's buffers, and records
-// batches.
+// Uses the engine's Vulkan device: builds pipelines, binds the engine's buffers, records batches
+// and barriers.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "dermis/export.h"
+#include <vulkan/vk_platform.h>
+
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "dermis/vulkan/barrier.h"
-#include "dermis/vulkan/bindings.h"
-#include "dermis/vulkan/handles.h"
-#include "dermis/vulkan/kernels.h"
+
+// ---- Declares the Vulkan types that Dermis' headers use, as vulkan_core.h does, but does not
+// include it. So an engine may include volk, or Vulkan's header with or without prototypes, before
+// or after Dermis' headers. Only drawing.h includes vulkan_core.h.
+
+struct VkAllocationCallbacks;
+struct VkBufferCreateInfo;
+struct VkBufferMemoryBarrier;
+struct VkBufferMemoryBarrier2;
+struct VkMemoryBarrier;
+struct VkMemoryBarrier2;
+
+using VkDeviceSize = std::uint64_t;
+using VkFlags = std::uint32_t;
+using VkAccessFlags = VkFlags;
+using VkBufferUsageFlags = VkFlags;
+using VkPipelineStageFlags = VkFlags;
+
+using VkInstance = struct VkInstance_T*;
+using VkPhysicalDevice = struct VkPhysicalDevice_T*;
+using VkDevice = struct VkDevice_T*;
+using VkCommandBuffer = struct VkCommandBuffer_T*;
+// The same condition as in vulkan_core.h.
+#if defined(__LP64__) || defined(_WIN64) || (defined(__x86_64__) && !defined(__ILP32__)) || \
+    defined(_M_X64) || defined(__ia64) || defined(_M_IA64) || defined(__aarch64__) ||       \
+    defined(__powerpc64__)
+using VkBuffer = struct VkBuffer_T*;
+using VkPipelineCache = struct VkPipelineCache_T*;
+#else
+using VkBuffer = std::uint64_t;
+using VkPipelineCache = std::uint64_t;
+#endif
+
+using PFN_vkVoidFunction = void(VKAPI_PTR*)();
+using PFN_vkGetInstanceProcAddr = PFN_vkVoidFunction(VKAPI_PTR*)(VkInstance instance,
+                                                                 const char* name);
 
 namespace dermis::vulkan {
+
+inline constexpr VkBufferUsageFlags vertexBufferUsage =
+    0x80;  ///< VK_BUFFER_USAGE_VERTEX_BUFFER_BIT
+
+// ---- The barriers that the engine records around `record`, and before and after its own writes to
+// what `record` reads. Dermis records the barriers between its own commands, and does not track the
+// state of resources.
+//
+//   context.recordBarrier(commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
+//   context.record(commandBuffer, plan, bindings);  // or SceneRecorder::record
+//   context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
+
+/// How commands use a buffer. Combine uses by `|`.
+enum class Use : std::uint32_t {
+  /// All that `record` reads and writes. A SceneRecorder orders its own `record`s; between two
+  /// calls of `Context::record` with the same buffers, the engine records a barrier.
+  dermis = 1,
+  vertexInput = 2,   ///< draws, as a vertex buffer
+  vertexShader = 4,  ///< this and the next four: as a storage or texel buffer that is only read
+  fragmentShader = 8,
+  taskShader = 16,  ///< of VK_EXT_mesh_shader
+  meshShader = 32,
+  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline
+  accelerationStructureBuild = 128,  ///< the geometry of a build or refit
+  computeRead = 256,                 ///< by compute shaders of the engine
+  computeWrite = 512,
+  copyRead = 1024,   ///< vkCmdCopyBuffer
+  copyWrite = 2048,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
+  hostRead = 4096,   ///< through a mapping, after a fence
+  /// Through a mapping. What is written before the submission needs no barrier: vkQueueSubmit makes
+  /// it visible.
+  hostWrite = 8192,
+};
+/// Both uses.
+constexpr Use operator|(Use a, Use b) {
+  return static_cast<Use>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
+}
+
+/// Which half of a queue-family ownership transfer a barrier is. A transfer needs two barriers with
+/// the same uses: the release on the queue of the first, and the acquire on the queue of the
+/// second. Vulkan ignores the destination of a release and the source of an acquire (Vulkan 1.3,
+/// 7.7.4). The host has no queue family: uses by it are left out of a transfer. If no others are
+/// before or after it, all three values give the same barrier.
+enum class QueueTransfer : std::uint8_t { none = 0, release = 1, acquire = 2 };
+
+/// Stages and accesses of both sides of a barrier. VkPipelineStageFlags2 and VkAccessFlags2 have
+/// the same bits.
+struct DERMIS_VULKAN_API Barrier {
+  VkPipelineStageFlags sourceStages = 0;
+  VkAccessFlags sourceAccesses = 0;
+  VkPipelineStageFlags destinationStages = 0;
+  VkAccessFlags destinationAccesses = 0;
+
+  // For engines that record barriers themselves.
+
+  /// For vkCmdPipelineBarrier, which takes the stages as parameters.
+  operator VkMemoryBarrier() const;
+  /// The same for a whole buffer, without a transfer. The caller sets `buffer`, and may set the
+  /// range and the queue families.
+  operator VkBufferMemoryBarrier() const;
+  /// For vkCmdPipelineBarrier2 (Vulkan 1.3 or VK_KHR_synchronization2).
+  operator VkMemoryBarrier2() const;
+  /// The same for a whole buffer, without a transfer, as for VkBufferMemoryBarrier.
+  operator VkBufferMemoryBarrier2() const;
+};
+
+/// The barrier between two uses of a buffer, or of several buffers. After reads alone it has no
+/// source accesses: the second use only waits.
+DERMIS_VULKAN_API Barrier barrierBetween(Use before, Use after,
+                                         QueueTransfer transfer = QueueTransfer::none);
+
+// ---- The engine's buffers, and the descriptors with which Dermis binds them.
+
+/// A part of a VkBuffer.
+struct BufferRange {
+  VkBuffer buffer{};
+  /// Bytes; a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`.
+  VkDeviceSize offset = 0;
+  VkDeviceSize size = 0;  ///< bytes; a multiple of 4, not VK_WHOLE_SIZE
+};
+
+/// The output buffer of each attribute. Attributes may share a buffer. Each may be larger than a
+/// storage buffer range.
+struct OutputBuffers {
+  BufferRange positions;
+  BufferRange normals;
+  BufferRange tangents;
+  BufferRange previousPositions;
+
+  /// For one buffer that all attributes share.
+  static OutputBuffers oneBuffer(const BufferRange& range) { return {range, range, range, range}; }
+};
+
+/// The buffers of a batch. The engine owns them. `Plan::buffer` returns their sizes and usage: each
+/// has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. If `DeviceLimits::texelBuffers` is set, meshes, poses,
+/// tables and palettes have VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT, too; an engine that cannot
+/// add that usage sets `DeviceDescription::texelBuffers` to false.
+///
+/// A buffer that no plan needs may be left out: meshes and outputs if there are no jobs, poses and
+/// tables if batches are empty, palettes if all jobs are linear, results if no job has results, and
+/// the output of an attribute that no job writes.
+struct BatchBuffers {
+  BufferRange meshes;    ///< packed meshes, each at its `Job::meshOffset`
+  BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
+  BufferRange tables;    ///< what `writeTables` wrote
+  BufferRange palettes;  ///< palettes and `PoseStatus`, which the palette kernel writes
+  OutputBuffers outputs;
+  BufferRange results;  ///< `InstanceResult` at `Plan::resultOffset`
+};
+
+struct BindingsState;
+
+/// Descriptor sets and buffer views for one set of buffers, made by `Context::createBindings`. They
+/// must live until the GPU has completed all commands that were recorded with them. Destroy them
+/// before the buffers and the Context. Any number of threads may `record` with them at the same
+/// time.
+class DERMIS_VULKAN_API Bindings {
+ public:
+  Bindings();
+  ~Bindings();
+  Bindings(Bindings&&) noexcept;
+  Bindings& operator=(Bindings&&) noexcept;
+
+ private:
+  friend class Context;
+  friend class SceneRecorder;
+  friend struct ContextState;
+  std::unique_ptr<BindingsState> state_;
+};
+
+// ---- How to build a pipeline, for an engine that executes the commands of a plan with its own
+// RHI, and modules that replace those of the library. Needs no Vulkan device.
+//
+// What kernels read and write, and the push constants, are declared in shaders/abi.h, which
+// compiles as C++. It is installed in DERMIS_SHADER_DIR.
+
+/// What a compute pipeline is built from.
+struct PipelineDescription {
+  std::string name;    ///< for messages and debuggers
+  std::string module;  ///< name of the SPIR-V module, for example "skin_texels"
+  /// SPIR-V 1.3, entry point "main". The memory is static; pipelines of one module have the same.
+  /// With texel buffers it requires the features `shaderInt64` and `scalarBlockLayout`.
+  std::span<const std::uint32_t> spirv;
+  /// The values of the specialization constants from id 0 on, 4 bytes each.
+  std::vector<std::uint32_t> constants;
+  /// Descriptor set 0 has storage buffers in the slots from 0 on, and uniform texel buffers in the
+  /// slots that follow. The only other resource is a range of push constants, at most
+  /// `DispatchCommand::constants`. All pipelines for one device can share a layout: the largest.
+  std::uint32_t storageBuffers = 0, texelBuffers = 0;
+};
+
+/// Describes a pipeline. Fails with `invalidArgument` if `pipelines` never lists it, and with
+/// `missingFeature` if this build of Dermis does not contain its module.
+DERMIS_VULKAN_API Result<PipelineDescription> pipelineDescription(PipelineId id);
+
+/// Supplies modules to a Context that replace those in the library: `RuntimeCompiler::source`
+/// (compilers.h), or the engine's own build of the kernels.
+struct KernelSource {
+  void* user = nullptr;  ///< passed to `get`
+  /// Returns the SPIR-V of the module with this name (`PipelineDescription::module`).
+  /// `Context::prepare` calls it for each pipeline that it creates, in the thread that calls
+  /// `prepare`; several threads may call it at once. If it fails, `prepare` fails with the same
+  /// error. It must not throw. If null, the modules in the library are used.
+  Result<std::vector<std::uint32_t>> (*get)(void* user, std::string_view name) = nullptr;
+};
+
+/// A module and its name. The caller owns the memory.
+struct KernelModule {
+  std::string_view name;
+  std::span<const std::uint32_t> spirv;
+};
+
+// ---- The context.
 
 /// The features that Dermis uses if the engine enabled them on its device. A bit mask: combine them
 /// by `|`.

@@ -1,7 +1,7 @@
 // `BufferCallbacks` for the Vulkan Memory Allocator, version 3. Include vk_mem_alloc.h first.
 #pragma once
 
-#include "dermis/vulkan/buffer_callbacks.h"
+#include "dermis/vulkan/scene_recorder.h"
 
 namespace dermis::vulkan {
 

@@ -8,8 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "dermis/bounds.h"
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "linear_algebra.h"
 
 namespace dermis::bounds {

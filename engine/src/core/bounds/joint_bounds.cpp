@@ -11,8 +11,7 @@
 
 #include "attribute.h"
 #include "bounds/extent.h"
-#include "dermis/bounds.h"
-#include "dermis/validate.h"
+#include "dermis/mesh.h"
 #include "strict_floating_point.h"
 #include "text.h"
 

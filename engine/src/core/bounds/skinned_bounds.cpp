@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bounds/extent.h"
-#include "dermis/bounds.h"
+#include "dermis/mesh.h"
 #include "strict_floating_point.h"
 
 namespace dermis::bounds {

@@ -10,8 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "dermis/bounds.h"
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 #include "pack/check.h"
 #include "strict_floating_point.h"
 

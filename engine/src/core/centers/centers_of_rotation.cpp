@@ -1,7 +1,7 @@
 // Computes centers of rotation: first reads the inputs from the views of the mesh, then solves each
 // vertex independently.
 
-#include "dermis/centers_of_rotation.h"
+#include "dermis/mesh.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -15,9 +15,6 @@
 #include "attribute.h"
 #include "centers/pair_index.h"
 #include "check_mesh.h"
-#include "dermis/mesh.h"
-#include "dermis/types.h"
-#include "dermis/validate.h"
 #include "linear_algebra.h"
 #include "pack/influences.h"
 #include "strict_floating_point.h"

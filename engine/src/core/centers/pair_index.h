@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 
 namespace dermis::centers {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "abi.h"
-#include "dermis/types.h"
+#include "dermis/mesh.h"
 
 namespace dermis {
 namespace {

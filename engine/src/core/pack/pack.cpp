@@ -1,4 +1,4 @@
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,8 +8,6 @@
 
 #include "abi.h"
 #include "attribute.h"
-#include "dermis/types.h"
-#include "dermis/validate.h"
 #include "pack/check.h"
 #include "pack/influences.h"
 #include "strict_floating_point.h"

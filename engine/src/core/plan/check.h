@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "dermis/export.h"
 #include "dermis/plan.h"
+#include "dermis/result.h"
 #include "plan/placement.h"
 
 namespace dermis {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dermis/export.h"
 #include "dermis/plan.h"
+#include "dermis/result.h"
 #include "plan/variant.h"
 
 namespace dermis {

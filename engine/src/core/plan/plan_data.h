@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/export.h"
 #include "dermis/plan.h"
+#include "dermis/result.h"
 #include "plan/placement.h"
 
 namespace dermis {

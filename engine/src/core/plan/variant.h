@@ -5,10 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "dermis/export.h"
-#include "dermis/method.h"
+#include "dermis/layout.h"
 #include "dermis/plan.h"
-#include "dermis/vertex_format.h"
+#include "dermis/result.h"
 
 namespace dermis {
 

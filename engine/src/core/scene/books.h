@@ -11,11 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/handle.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
-#include "dermis/scene_commands.h"
 #include "plan/encode.h"
 #include "plan/work.h"
 #include "scene/range_allocator.h"

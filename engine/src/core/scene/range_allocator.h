@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/export.h"
+#include "dermis/result.h"
 
 namespace dermis {
 

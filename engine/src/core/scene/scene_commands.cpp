@@ -1,4 +1,4 @@
-#include "dermis/scene_commands.h"
+#include "dermis/scene.h"
 
 #include <string>
 #include <utility>

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/handle.h"
 #include "dermis/result.h"
+#include "dermis/scene.h"
 
 namespace dermis {
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "dermis/shader_compiler.h"
+#include "dermis/compilers.h"
 #include "shader_compiler/file_io.h"
 #include "shader_compiler/no_contraction.h"
 #include "shader_compiler/tool/embedding.h"

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "dermis/vulkan/bindings.h"
-#include "dermis/vulkan/buffer_callbacks.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "dermis/vulkan/buffer_callbacks.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "scene/range_allocator.h"
 #include "vulkan/recorder/functions.h"
 

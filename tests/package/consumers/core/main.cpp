@@ -11,10 +11,15 @@
 #include <string>
 #include <vector>
 
-#include "dermis/dermis.h"
-#include "dermis/glm.h"
-#include "dermis/verify/accuracy.h"
-#include "dermis/verify/reference.h"
+#include <glm/mat4x3.hpp>
+#include <glm/mat4x4.hpp>
+
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/scene.h"
+#include "dermis/verify.h"
 
 namespace {
 
@@ -141,7 +146,7 @@ void printGlm() {
   glm::mat4 matrix(1.0f);
   matrix[3] = glm::vec4(4, 5, 6, 1);
   const JointMatrix joint = toJointMatrix(matrix);
-  const glm::mat4x3 back = toGlm(joint);
+  const glm::mat4x3 back = toColumns<glm::mat4x3>(joint);
   std::printf("glm %.1f %.1f %.1f %.1f\n", static_cast<double>(joint.m[0][3]),
               static_cast<double>(joint.m[1][3]), static_cast<double>(joint.m[2][3]),
               static_cast<double>(back[3].y));

@@ -11,15 +11,14 @@
 #include <vector>
 
 #include "abi.h"
-#include "dermis/cpu/scene_runner.h"
-#include "dermis/cpu/skin.h"
+#include "dermis/compilers.h"
+#include "dermis/cpu.h"
 #include "dermis/gltf.h"
-#include "dermis/pack.h"
+#include "dermis/mesh.h"
 #include "dermis/plan.h"
-#include "dermis/shader_compiler.h"
-#include "dermis/verify/reference.h"
+#include "dermis/verify.h"
+#include "dermis/vulkan/context.h"
 #ifdef HAS_RUNTIME_COMPILER
-#include "dermis/runtime_compiler.h"
 #endif
 
 namespace {

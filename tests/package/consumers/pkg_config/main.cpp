@@ -1,5 +1,5 @@
 // A program with one library of Dermis, all of which is linked in.
-#include "dermis/version.h"
+#include "dermis/result.h"
 
 int main() {
   return dermis::libraryFitsHeaders() ? 0 : 1;

@@ -10,8 +10,13 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "dermis/dermis.h"
-#include "dermis/vulkan/vulkan.h"
+#include "dermis/layout.h"
+#include "dermis/mesh.h"
+#include "dermis/plan.h"
+#include "dermis/result.h"
+#include "dermis/scene.h"
+#include "dermis/vulkan/context.h"
+#include "dermis/vulkan/scene_recorder.h"
 
 namespace {
 
