@@ -515,7 +515,7 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
     std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
-  readHistory(bytes.subspan(history.toOffset, history.size));
+  if (history.size != 0) readHistory(bytes.subspan(history.toOffset, history.size));
   return {};
 }
 
