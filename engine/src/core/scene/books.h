@@ -159,6 +159,8 @@ struct SceneInstance {
   bool bounds = false;
   bool isWritten = false;      ///< `InstanceOutput::isWritten`
   std::optional<Place> shown;  ///< where it was last recorded
+
+  const Place& place() const { return shown ? *shown : target; }
 };
 
 struct SceneBooks {

@@ -265,9 +265,11 @@ Result<void> SceneBooks::plan(Plan& out) {
     return good;
   }
   for (CopyCommand& copy : resultCopies_) copy.to = nextReadBack().buffer.number;
-  historyCopy_.from = history_.now.number;
-  historyCopy_.to = nextReadBack().buffer.number;
-  historyCopy_.toOffset = readBackResults + sizes().results * sizeof(InstanceResult);
+  if (historyCopy_.size != 0) {
+    historyCopy_.from = history_.now.number;
+    historyCopy_.to = nextReadBack().buffer.number;
+    historyCopy_.toOffset = readBackResults + sizes().results * sizeof(InstanceResult);
+  }
   listGrowth();
   listUploads();
   nameBuffers();
@@ -515,7 +517,7 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
     std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
-  if (history.size != 0) readHistory(bytes.subspan(history.toOffset, history.size));
+  readHistory(bytes.subspan(history.toOffset, history.size));
   return {};
 }
 

@@ -520,7 +520,7 @@ Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   const SceneInstance* instance = books.instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   InstanceOutput output;
-  const Place& place = instance->shown ? *instance->shown : instance->target;
+  const Place& place = instance->place();
   const std::uint64_t offset = books.outputStore_.base + place.bytes.offset;
   const Result<VertexPlaces> places = placeVertices(instance->layout, place.vertexCount, offset);
   if (!places) return places.error();
@@ -554,7 +554,7 @@ Result<void> Scene::indexedDraws(std::span<const InstanceHandle> instances,
       return wrong(ErrorCode::invalidArgument,
                    unknownHandle("instance", instances[number]).message);
     }
-    const Place& place = instance->shown ? *instance->shown : instance->target;
+    const Place& place = instance->place();
     if (place.mesh.index >= indices.size())
       return wrong(ErrorCode::invalidArgument, "there is no range of indices for its mesh");
     if (layout == nullptr || *layout != instance->layout) {
