@@ -11,13 +11,13 @@
 
 #include "dermis/result.h"
 
-// ---- Compiles GLSL to SPIR-V. The build compiles the kernels of Dermis with it. An engine may use
-// it at run time.
-
 namespace dermis::vulkan {
 class Context;
 struct KernelSource;
 }  // namespace dermis::vulkan
+
+// ---- Compiles GLSL to SPIR-V. The build compiles the kernels of Dermis with it. An engine may use
+// it at run time.
 
 namespace dermis {
 
