@@ -23,7 +23,6 @@
 #include "dermis/vulkan/scene_recorder.h"
 
 using namespace dermis;
-using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 4, lostFrame = 3;
 
@@ -239,10 +238,11 @@ int main() {
       auto beginInfo =
           structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
       must(vkBeginCommandBuffer(engine.commandBuffer, &beginInfo));
-      context.recordBarrier(engine.commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
+      context.recordBarrier(engine.commandBuffer,
+                            vulkan::barrierBetween(Use::vertexInput, Use::dermis));
       must(recorder.record(engine.commandBuffer));
       context.recordBarrier(engine.commandBuffer,
-                            barrierBetween(Use::dermis, Use::vertexInput | Use::hostRead));
+                            vulkan::barrierBetween(Use::dermis, Use::vertexInput | Use::hostRead));
       must(vkEndCommandBuffer(engine.commandBuffer));
       // [lost-frame]
       if (frame == lostFrame) {

@@ -296,7 +296,7 @@ class MethodComparer {
         all[i].pose = part.pose;
         all[i].mayScale = part.mayScale;
         all[i].morphs = part.morphs;
-        all[i].output = output.data() + places->size * i;
+        all[i].output.fill(output.data() + places->size * i);
       }
       cpu::Job& job = jobs.emplace_back();
       job.mesh = &meshes.back();

@@ -244,12 +244,10 @@ Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const Morph
 
 Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
   device_->context.recordBarrier(
-      commandBuffer, vulkan::barrierBetween(vulkan::Use::vertexInput | vulkan::Use::copyRead,
-                                            vulkan::Use::dermis));
+      commandBuffer, vulkan::barrierBetween(Use::vertexInput | Use::copyRead, Use::dermis));
   if (Result<void> done = recorder_->record(commandBuffer); !done) return done;
   device_->context.recordBarrier(
-      commandBuffer, vulkan::barrierBetween(vulkan::Use::dermis,
-                                            vulkan::Use::vertexInput | vulkan::Use::copyRead));
+      commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput | Use::copyRead));
   return {};
 }
 
@@ -268,8 +266,9 @@ Result<void> DrawnScene::addDraws(std::uint32_t figure, const JointMatrix& trans
       const auto stream = [&](const OutputAttribute& attribute) -> samples::render::VertexStream {
         return {recorder_->outputBuffer(), attribute.offset, attribute.stride, attribute.format};
       };
-      draw.positions = stream(output->positions);
-      if (output->normals.format != VertexFormat::none) draw.normals = stream(output->normals);
+      draw.positions = stream(output->places[Stream::positions]);
+      if (output->places[Stream::normals].format != VertexFormat::none)
+        draw.normals = stream(output->places[Stream::normals]);
       continue;
     }
     const gltf::Primitive& primitive = *scene_->parts[index].primitive;

@@ -51,7 +51,6 @@ namespace {
 
 using namespace dermis;
 using namespace dermis::samples;
-using vulkan::Use;
 using Json = nlohmann::ordered_json;
 
 struct Options {
@@ -143,7 +142,7 @@ InstanceDescription describe(const Part& part, const Options& options) {
   InstanceDescription description;
   description.layout.positions = VertexFormat::float32x3;
   if (part.packed.info().hasNormals) description.layout.normals = VertexFormat::octahedral16x2;
-  description.layout.motion = Motion::kept;  // for motion vectors
+  description.layout.motion = true;  // for motion vectors
   description.culledOnGpu = options.culledOnGpu;
   return description;
 }
@@ -318,10 +317,10 @@ void skinFrame(vulkan::SceneRecorder& recorder, Crowd& crowd, std::uint64_t fram
 
   // The check copies the vertices. An engine that draws in each frame uses `Use::vertexInput` in
   // both barriers.
-  open.context.recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
+  open.context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyRead, Use::dermis));
   must(recorder.record(commandBuffer, description));
   const Use use = options.picture.empty() ? Use::copyRead : Use::copyRead | Use::vertexInput;
-  open.context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, use));
+  open.context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, use));
 }
 // [/crowd-frame]
 
@@ -503,7 +502,7 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
                     const vulkan::SceneRecorder& recorder, ReadBack& readBack) {
   std::uint64_t size = 0;
   for (const ShownInstance& instance : readBack.instances)
-    size = std::max(size, instance.output.offset + instance.output.size);
+    size = std::max(size, instance.output.offset + instance.output.places.size);
   if (size == 0) return;
   if (readBack.buffer.bytes().size() < size) {
     readBack.buffer =
@@ -512,7 +511,7 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
   const VkBufferCopy region{0, 0, size};
   device.functions().CmdCopyBuffer(commandBuffer, recorder.outputBuffer(), readBack.buffer.handle(),
                                    1, &region);
-  recordBarrier(device, commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
+  recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
 }
 
 /// The parts of the figures in view, in the world: a figure stands for each square meter.

@@ -30,7 +30,6 @@
 #include "dermis/vulkan/scene_recorder.h"
 
 using namespace dermis;
-using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, jointCount = 2, instanceCount = 100, frameCount = 4;
 
@@ -219,14 +218,14 @@ int main() {
     jobs[instance].mesh = packed.info();
     jobs[instance].pose = instance;
     jobs[instance].method = needs.method;
-    jobs[instance].place(must(placeVertices(needs.layout, vertexCount, instance * instanceSize)));
+    jobs[instance].places = must(placeVertices(needs.layout, vertexCount, instance * instanceSize));
   }
   Batch batch;
   batch.poses = descriptions;
   batch.jobs = jobs;
   batch.meshesSize = packed.bytes().size();
   batch.posesSize = instanceCount * poseSize;
-  batch.outputs = OutputSizes::oneBuffer(instanceCount * instanceSize);
+  batch.outputSizes.fill(instanceCount * instanceSize);
   Plan plan;
   must(makePlan(batch, context.limits(), context.tuning(), plan));
 
@@ -245,7 +244,7 @@ int main() {
        .poses = {poses.handle, 0, poses.size},
        .tables = {tables.handle, 0, tables.size},
        .palettes = {palettes.handle, 0, palettes.size},
-       .outputs = vulkan::OutputBuffers::oneBuffer({vertices.handle, 0, vertices.size}),
+       .outputs = ByStream<vulkan::BufferRange>::all({vertices.handle, 0, vertices.size}),
        .results = {}}));
   // [/set-up]
 
@@ -258,10 +257,10 @@ int main() {
     std::ranges::copy(std::as_bytes(std::span(matrices)), poses.bytes().begin());
     must(writeTables(plan, tables.bytes()));
     // The engine records the barriers around `record`: only it knows how else it uses the buffers.
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::dermis));
+    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
     must(context.record(engine.commandBuffer, plan, bindings));
     // This program reads the vertices on the CPU. To draw them, use `Use::vertexInput`.
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::hostRead));
+    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
     // [/frame]
     must(vkEndCommandBuffer(engine.commandBuffer));
     submit(engine);

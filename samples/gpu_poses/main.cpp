@@ -24,7 +24,6 @@
 #include "dermis_gpu_poses_shaders.h"  // wave.comp as SPIR-V
 
 using namespace dermis;
-using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 40, jointCount = 2, figureCount = 10'000, frameCount = 3;
 
@@ -258,7 +257,7 @@ int main() {
   must(recorder.prepare(figure));
   // [add]
   std::vector<PoseHandle> handles(figureCount);
-  must(scene.addPoses(handles, jointCount, {.writer = PoseWriter::gpu}));
+  must(scene.addPoses(handles, jointCount, {.writtenByGpu = true}));
   std::vector<InstanceHandle> figures;
   for (const PoseHandle pose : handles) {
     figure.pose = pose;
@@ -275,13 +274,16 @@ int main() {
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
     // [frame]
     // The previous frame may still read the poses.
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::computeWrite));
+    context.recordBarrier(engine.commandBuffer,
+                          vulkan::barrierBetween(Use::dermis, Use::computeWrite));
     animation.record(engine.commandBuffer, static_cast<float>(frame));
     must(scene.markAllWritten());
-    context.recordBarrier(engine.commandBuffer,
-                          barrierBetween(Use::computeWrite | Use::vertexInput, Use::dermis));
+    context.recordBarrier(
+        engine.commandBuffer,
+        vulkan::barrierBetween(Use::computeWrite | Use::vertexInput, Use::dermis));
     must(recorder.record(engine.commandBuffer));
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
+    context.recordBarrier(engine.commandBuffer,
+                          vulkan::barrierBetween(Use::dermis, Use::vertexInput));
     // [/frame]
     // An engine draws here.
     must(vkEndCommandBuffer(engine.commandBuffer));
@@ -296,11 +298,12 @@ int main() {
   const Buffer matrices = makeBuffer(engine, needed.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, mapped);
   auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
-  context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
+  context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
   const VkBufferCopy allVertices{0, 0, outputSize}, allPoses{0, 0, needed.size};
   vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), vertices.buffer, 1, &allVertices);
   vkCmdCopyBuffer(engine.commandBuffer, poses.buffer, matrices.buffer, 1, &allPoses);
-  context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
+  context.recordBarrier(engine.commandBuffer,
+                        vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
   must(vkEndCommandBuffer(engine.commandBuffer));
   submit(engine);
   std::uint32_t right = 0;

@@ -12,17 +12,13 @@
 namespace dermis::samples {
 namespace {
 
-using Attributes = std::array<OutputAttribute*, streamCount>;
-
 /// Places the attributes of one instance after those that are in the outputs already.
 class OutputPlacer {
  public:
-  OutputPlacer(const OutputLayout& output, OutputSizes& sizes) : output_(output), sizes_(sizes) {}
+  OutputPlacer(const OutputLayout& output, ByStream<std::uint64_t>& sizes)
+      : output_(output), sizes_(sizes) {}
 
-  void place(Job& job, const Attributes& attributes) {
-    const std::uint64_t vertices = job.mesh.vertexCount;
-    const std::array<std::uint64_t*, streamCount> sizes{
-        &sizes_.positions, &sizes_.normals, &sizes_.tangents, &sizes_.previousPositions};
+  void place(std::uint64_t vertices, ByStream<OutputAttribute>& attributes) {
     const auto isTogether = [&](std::size_t stream) {
       const auto which = static_cast<Stream>(stream);
       return output_.arrangement == Arrangement::interleaved ||
@@ -31,16 +27,15 @@ class OutputPlacer {
     };
     std::uint32_t vertexSize = output_.gap;
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      if (isTogether(stream)) vertexSize += formatSize(attributes[stream]->format);
+      if (isTogether(stream)) vertexSize += formatSize(attributes[stream].format);
     }
     std::uint64_t first = 0;
     std::uint32_t inVertex = 0;
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      OutputAttribute& attribute = *attributes[stream];
+      OutputAttribute& attribute = attributes[stream];
       const std::uint32_t size = formatSize(attribute.format);
       if (size == 0) continue;
-      std::uint64_t& end =
-          output_.arrangement == Arrangement::separate ? *sizes[stream] : sizes_.positions;
+      std::uint64_t& end = sizes_[output_.arrangement == Arrangement::separate ? stream : 0];
       if (isTogether(stream)) {
         if (inVertex == 0) {
           first = end;
@@ -60,7 +55,7 @@ class OutputPlacer {
 
  private:
   const OutputLayout& output_;
-  OutputSizes& sizes_;
+  ByStream<std::uint64_t>& sizes_;
 };
 
 std::uint32_t addPose(BatchLayout& layout, std::span<const JointMatrix> pose, bool mayScale) {
@@ -75,22 +70,6 @@ std::uint32_t addPose(BatchLayout& layout, std::span<const JointMatrix> pose, bo
 }
 
 }  // namespace
-
-OutputAttribute attributeOf(const Job& job, std::size_t stream) {
-  switch (static_cast<Stream>(stream)) {
-    case Stream::normals:
-      return job.normals;
-    case Stream::tangents:
-      return job.tangents;
-    case Stream::previousPositions: {
-      OutputAttribute attribute = job.previousPositions;
-      attribute.format = job.motion == Motion::none ? VertexFormat::none : job.positions.format;
-      return attribute;
-    }
-    default:
-      return job.positions;
-  }
-}
 
 BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output) {
   BatchLayout layout;
@@ -108,17 +87,16 @@ BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayou
     job.morphs = request.morphs;
     job.box = request.box;
     job.bounds = output.bounds;
-    job.motion = output.motion;
     job.restartsMotion = request.restartsMotion;
     job.settles = request.settles;
-    job.positions.format = output.positions;
-    if (job.mesh.hasNormals) job.normals.format = output.normals;
-    if (job.mesh.hasTangents) job.tangents.format = output.tangents;
-    if (output.motion != Motion::none) job.previousPositions.format = output.positions;
-    placer.place(job, {&job.positions, &job.normals, &job.tangents, &job.previousPositions});
+    job.places[Stream::positions].format = output.positions;
+    if (job.mesh.hasNormals) job.places[Stream::normals].format = output.normals;
+    if (job.mesh.hasTangents) job.places[Stream::tangents].format = output.tangents;
+    if (output.motion) job.places[Stream::previousPositions].format = output.positions;
+    placer.place(job.mesh.vertexCount, job.places.attributes);
     layout.jobs.push_back(job);
   }
-  if (layout.oneOutput) layout.outputs = OutputSizes::oneBuffer(layout.outputs.positions);
+  if (layout.oneOutput) layout.outputs.fill(layout.outputs[Stream::positions]);
   return layout;
 }
 
@@ -171,7 +149,7 @@ void BatchRunner::readOutputs(BatchResult& result) const {
     const Job& job = layout_.jobs[index];
     SkinnedVertices& skinned = result.instances[index];
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      const OutputAttribute attribute = attributeOf(job, stream);
+      const OutputAttribute attribute = job.places.attributes[stream];
       skinned.formats[stream] = attribute.format;
       skinned.streams[stream] =
           copyAttribute(outputBytes(outputOf(stream)), attribute, job.mesh.vertexCount);
@@ -188,7 +166,7 @@ void BatchRunner::countChangedBytes(BatchResult& result) const {
     written[buffer].resize(outputBytes(buffer).size());
   for (const Job& job : layout_.jobs) {
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
-      const OutputAttribute attribute = attributeOf(job, stream);
+      const OutputAttribute attribute = job.places.attributes[stream];
       std::vector<bool>& marks = written[outputOf(stream)];
       for (std::uint64_t vertex = 0; vertex < job.mesh.vertexCount; ++vertex) {
         for (std::uint64_t byte = 0; byte < formatSize(attribute.format); ++byte)

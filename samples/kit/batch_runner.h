@@ -48,7 +48,7 @@ struct OutputLayout {
   VertexFormat positions = VertexFormat::float32x3;
   VertexFormat normals = VertexFormat::float32x3;
   VertexFormat tangents = VertexFormat::none;
-  Motion motion = Motion::none;
+  bool motion = false;
   bool bounds = false;
   Arrangement arrangement = Arrangement::interleaved;
   std::uint32_t gap = 0;  ///< bytes after each vertex (interleaved) or element; never written
@@ -62,16 +62,15 @@ struct BatchLayout {
   std::vector<std::span<const JointMatrix>> poses;  ///< in the same order
   std::vector<Job> jobs;                            ///< of the requests
   std::uint64_t meshesSize = 0, posesSize = 0;
-  OutputSizes outputs;
+  ByStream<std::uint64_t> outputs{};
   bool oneOutput = true;
 
-  Batch batch() const { return {poseDescriptions, jobs, meshesSize, posesSize, outputs}; }
+  Batch batch() const {
+    return {poseDescriptions, jobs, meshesSize, posesSize, outputs, oneOutput};
+  }
 };
 
 BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayout& output);
-
-/// An attribute of a job, by `Stream`; `none` if it is not written.
-OutputAttribute attributeOf(const Job& job, std::size_t stream);
 
 /// The result of one request.
 struct SkinnedVertices {

@@ -85,9 +85,9 @@ CharacterCheck::Finding CharacterCheck::check(const ShownInstance& instance, con
     return {bytes.data() + output.offset, vertexCount, output.stride, output.format};
   };
   SkinnedView current, previous;
-  current.positions = attribute(instance.output.positions);
-  current.normals = attribute(instance.output.normals);
-  previous.positions = attribute(instance.output.previousPositions);
+  current.positions = attribute(instance.output.places[Stream::positions]);
+  current.normals = attribute(instance.output.places[Stream::normals]);
+  previous.positions = attribute(instance.output.places[Stream::previousPositions]);
   const reference::SkinnedMesh& now = expected(instance.part, pose.current);
   const reference::SkinnedMesh& before = expected(instance.part, pose.previous);
   Finding finding;

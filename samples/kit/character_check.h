@@ -58,7 +58,7 @@ class CharacterCheck {
     double worst = 0;            ///< the largest error ÷ its bound
   };
 
-  /// `character` must outlive it. Instances are skinned by `method`, with `Motion::kept`.
+  /// `character` must outlive it. Instances are skinned by `method`, with `true`.
   CharacterCheck(const Character& character, Method method)
       : character_(&character), method_(method) {}
 

@@ -34,11 +34,9 @@ class CpuRunner : public BatchRunner {
 };
 
 void CpuRunner::makeOutputs() {
-  const OutputSizes& sizes = layout_.outputs;
-  const std::array<std::uint64_t, streamCount> all{sizes.positions, sizes.normals, sizes.tangents,
-                                                   sizes.previousPositions};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const auto size = static_cast<std::size_t>(layout_.oneOutput && stream > 0 ? 0 : all[stream]);
+    const auto size =
+        static_cast<std::size_t>(layout_.oneOutput && stream > 0 ? 0 : layout_.outputs[stream]);
     if (outputs_[stream].size() != size) outputs_[stream].assign(size, options_.poison);
   }
 }
@@ -60,14 +58,14 @@ Result<void> CpuRunner::makeMeshes() {
 /// different offsets.
 cpu::Instance CpuRunner::instanceOf(const Job& job) {
   const auto memory = [&](std::size_t stream) -> void* {
-    const OutputAttribute attribute = attributeOf(job, stream);
+    const OutputAttribute& attribute = job.places.attributes[stream];
     if (attribute.format == VertexFormat::none) return nullptr;
     return outputs_[outputOf(stream)].data() + attribute.offset;
   };
   cpu::Instance instance;
   instance.pose = layout_.poses[job.pose];
   instance.mayScale = layout_.poseDescriptions[job.pose].mayScale;
-  instance.output = {memory(0), memory(1), memory(2), memory(3)};
+  instance.output = {{memory(0), memory(1), memory(2), memory(3)}};
   instance.box = job.box;
   instance.morphs = job.morphs;
   instance.restartsMotion = job.restartsMotion;
@@ -88,11 +86,8 @@ std::vector<cpu::Job> CpuRunner::cutUp(std::span<const cpu::Instance> instances)
     cpu::Job job;
     job.mesh = &meshes_.at(like.meshOffset);
     job.method = like.method;
-    job.places = {like.positions, like.normals, like.tangents, like.previousPositions};
-    job.places.motion = like.motion;
-    for (OutputAttribute* attribute : {&job.places.positions, &job.places.normals,
-                                       &job.places.tangents, &job.places.previousPositions})
-      attribute->offset = 0;
+    job.places = like.places;
+    for (OutputAttribute& attribute : job.places.attributes) attribute.offset = 0;
     job.instances = instances.subspan(first, end - first);
     for (std::uint32_t vertex = 0; vertex < like.mesh.vertexCount;
          vertex += options_.tuning.workgroupSize) {
@@ -129,7 +124,7 @@ Result<BatchResult> CpuRunner::skin() {
     const auto first = static_cast<std::size_t>(job.instances.data() - instances.data());
     for (std::size_t i = 0; i < own.size(); ++i) {
       const Job& from = layout_.jobs[first + i];
-      if (from.bounds || isSnormPosition(from.positions.format)) own[i].result = &found[i];
+      if (from.bounds || isSnormPosition(from.places[Stream::positions].format)) own[i].result = &found[i];
     }
     cpu::Job part = job;
     part.instances = own;

@@ -54,13 +54,11 @@ Result<void> TimedBatches::record(TimedBatch& batch) {
   begin.flags = VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
   batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
-  context_->recordBarrier(batch.commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
+  context_->recordBarrier(batch.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
   timestamps_.recordBegin(batch.commandBuffer);
   const Result<void> done = context_->record(batch.commandBuffer, batch.plan, *batch.bindings);
   timestamps_.recordEnd(batch.commandBuffer);
-  context_->recordBarrier(batch.commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
+  context_->recordBarrier(batch.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
   functions.EndCommandBuffer(batch.commandBuffer);
   return done;
 }
@@ -85,7 +83,7 @@ Result<void> TimedBatches::add(std::span<const SkinRequest> requests, const Outp
     return written;
   Result<vulkan::Bindings> bindings = context_->createBindings(
       {meshes_.range(), matrices_.range(), batch->tables.range(), batch->palettes.range(),
-       vulkan::OutputBuffers::oneBuffer(output_.range()), batch->results.range()});
+       ByStream<vulkan::BufferRange>::all(output_.range()), batch->results.range()});
   if (!bindings) return bindings.error();
   batch->bindings.emplace(std::move(*bindings));
   batches_.push_back(std::move(batch));

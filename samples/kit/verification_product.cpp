@@ -34,7 +34,7 @@ struct OutputValues {
   std::span<const VertexFormat> positions, normals, tangents;
   std::span<const Arrangement> arrangements;
   std::span<const std::uint32_t> gaps;
-  std::span<const Motion> motions;
+  std::span<const bool> motions;
   std::span<const bool> bounds;
   std::span<const Tuning> tunings;
 
@@ -59,7 +59,7 @@ struct InputValues {
 constexpr std::array arrangements{Arrangement::interleaved, Arrangement::planar,
                                   Arrangement::separate, Arrangement::directionsTogether};
 constexpr std::array<std::uint32_t, 2> gaps{0, 4};
-constexpr std::array motions{Motion::none, Motion::kept};
+constexpr std::array motions{false, true};
 constexpr std::array either{false, true};
 constexpr std::array<Tuning, 5> tunings{{{64, 4}, {8, 1}, {16, 2}, {32, 3, 1000}, {128, 16}}};
 constexpr OutputValues allOutputs{verifiedPositionFormats,
@@ -151,8 +151,7 @@ bool areRunsPossible(const OutputValues& values, std::span<const std::uint32_t> 
     return mayBe(3, values.arrangements, [=](Arrangement other) { return other == one; });
   };
   const bool isInterleaved = mayStand(Arrangement::interleaved);
-  const bool isStill =
-      mayBe(5, values.motions, [](Motion motion) { return motion == Motion::none; });
+  const bool isStill = mayBe(5, values.motions, [](bool motion) { return !motion; });
   for (unsigned small = 0; small < 8; ++small) {
     const bool positions = (small & 1) != 0, normals = (small & 2) != 0,
                tangents = (small & 4) != 0;
@@ -236,7 +235,7 @@ std::string OutputCase::name() const {
           : layout.arrangement == Arrangement::separate  ? ", separate"
                                                          : ", directions together";
   if (layout.gap != 0) text += ", gaps of " + std::to_string(layout.gap);
-  if (layout.motion == Motion::kept) text += ", previous kept";
+  if (layout.motion) text += ", previous kept";
   if (layout.bounds) text += ", bounds";
   return text + ", " + std::to_string(tuning.workgroupSize) + " invocations, " +
          std::to_string(tuning.instancesPerInvocation) + " instances each";

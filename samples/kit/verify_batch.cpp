@@ -82,7 +82,7 @@ class BatchVerifier {
     for (std::size_t index = 0; index < instances_.size(); ++index) {
       if (Result<void> done = compareAttributes(frames->now.instances[index], index); !done)
         return done.error();
-      if (output_.layout.motion != Motion::none) {
+      if (output_.layout.motion) {
         if (Result<void> done = compareMotion(*frames, index); !done) return done.error();
       }
       if (output_.layout.bounds) checkBounds(frames->now.instances[index], index);
@@ -140,7 +140,7 @@ class BatchVerifier {
     options.output = output_.layout;
     options.poison = poison;
     const std::unique_ptr<BatchRunner> runner = target_.runner(options);
-    const bool moves = output_.layout.motion != Motion::none;
+    const bool moves = output_.layout.motion;
     std::vector<SkinRequest> now, before, settled;
     for (const std::size_t index : indices) {
       now.push_back(requestOf(index));

@@ -47,11 +47,9 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
 Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,
                     const vulkan::Bindings& bindings) {
   return device.run([&](VkCommandBuffer commandBuffer) {
-    context.recordBarrier(commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
+    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
     Result<void> done = context.record(commandBuffer, plan, bindings);
-    context.recordBarrier(commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
+    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
     return done;
   });
 }
@@ -67,7 +65,7 @@ class VulkanRunner : public BatchRunner {
     return outputs_[stream].bytes();
   }
   Result<void> makeOutputs(const Plan& plan);
-  vulkan::OutputBuffers outputRanges() const;
+  ByStream<vulkan::BufferRange> outputRanges() const;
 
   Device& device_;
   vulkan::Context& context_;
@@ -87,9 +85,9 @@ Result<void> VulkanRunner::makeOutputs(const Plan& plan) {
   return {};
 }
 
-vulkan::OutputBuffers VulkanRunner::outputRanges() const {
-  if (layout_.oneOutput) return vulkan::OutputBuffers::oneBuffer(outputs_[0].range());
-  return {outputs_[0].range(), outputs_[1].range(), outputs_[2].range(), outputs_[3].range()};
+ByStream<vulkan::BufferRange> VulkanRunner::outputRanges() const {
+  if (layout_.oneOutput) return ByStream<vulkan::BufferRange>::all(outputs_[0].range());
+  return {{outputs_[0].range(), outputs_[1].range(), outputs_[2].range(), outputs_[3].range()}};
 }
 
 Result<BatchResult> VulkanRunner::skin() {

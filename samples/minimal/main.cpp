@@ -22,7 +22,6 @@
 #include "dermis/vulkan/scene_recorder.h"
 
 using namespace dermis;
-using vulkan::Use;
 
 constexpr std::uint32_t vertexCount = 200, frameCount = 3;
 
@@ -176,14 +175,15 @@ int main() {
     // `frame - 1`: the newest frame that the GPU has completed. This program waits for each.
     must(scene.beginFrame(frame, frame - 1));
     std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
+    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::copyRead, Use::dermis));
     must(recorder.record(engine.commandBuffer));
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
+    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
     // [/frame]
     // An engine draws here. This program copies the vertices to compare them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
     vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), engine.readBack, 1, &copy);
-    context.recordBarrier(engine.commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
+    context.recordBarrier(engine.commandBuffer,
+                          vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
     must(vkEndCommandBuffer(engine.commandBuffer));
     auto submit = structure<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
     submit.commandBufferCount = 1;

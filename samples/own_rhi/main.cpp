@@ -268,7 +268,6 @@ struct Executor {
   }
 
   void execute(std::span<const Command> commands);
-  static void addAccess(Access accesses, VkPipelineStageFlags& stages, VkAccessFlags& flags);
 };
 
 void Executor::execute(std::span<const Command> commands) {
@@ -320,31 +319,15 @@ void Executor::execute(std::span<const Command> commands) {
                               clear.part.size, 0);
             },
             [&](const BarrierCommand& barrier) {
-              VkPipelineStageFlags before = 0, after = 0;
-              auto memory = structure<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-              addAccess(barrier.before, before, memory.srcAccessMask);
-              addAccess(barrier.after, after, memory.dstAccessMask);
-              vkCmdPipelineBarrier(to, before, after, 0, 1, &memory, 0, nullptr, 0, nullptr);
+              const vulkan::Barrier between = vulkan::barrierBetween(barrier.before, barrier.after);
+              const VkMemoryBarrier memory = between;
+              vkCmdPipelineBarrier(to, between.sourceStages, between.destinationStages, 0, 1,
+                                   &memory, 0, nullptr, 0, nullptr);
             }},
         command);
   }
 }
 // [/executor]
-
-void Executor::addAccess(Access accesses, VkPipelineStageFlags& stages, VkAccessFlags& flags) {
-  const auto add = [&](Access one, VkPipelineStageFlags stage, VkAccessFlags flag) {
-    if (!includes(accesses, one)) return;
-    stages |= stage;
-    flags |= flag;
-  };
-  add(Access::computeRead, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT);
-  add(Access::computeWrite, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT);
-  add(Access::copyRead, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT);
-  add(Access::copyWrite, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
-  add(Access::indirectRead, VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
-      VK_ACCESS_INDIRECT_COMMAND_READ_BIT);
-  add(Access::hostRead, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
-}
 
 // -- The figures: strips of two joints.
 

@@ -71,15 +71,14 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
   orStop(writeTables(plan_, tables_.bytes()));
   bindings_.emplace(orStop(open.context.createBindings(
       {meshes_.range(), matrices_.range(), tables_.range(), palettes_.range(),
-       vulkan::OutputBuffers::oneBuffer(output_.range()), results_.range()})));
+       ByStream<vulkan::BufferRange>::all(output_.range()), results_.range()})));
 
   samples::Device& device = *open.device;
   commandBuffer_ = device.allocateCommandBuffer();
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   device.functions().BeginCommandBuffer(commandBuffer_, &begin);
-  open.context.recordBarrier(commandBuffer_,
-                             vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
+  open.context.recordBarrier(commandBuffer_, vulkan::barrierBetween(Use::dermis, Use::dermis));
   orStop(open.context.record(commandBuffer_, plan_, *bindings_));
   device.functions().EndCommandBuffer(commandBuffer_);
   // The first time drivers compile, and memory is touched.

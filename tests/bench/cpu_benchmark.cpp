@@ -160,8 +160,8 @@ std::vector<Case> furtherCases() {
   };
   add({}, false, "positions alone");
   add({.normals = float32x3, .tangents = float32x4}, false, "tangents");
-  add({.normals = float32x3, .motion = Motion::kept}, false, "previous positions");
-  add({.normals = float32x3, .arrangement = Arrangement::planar}, false, "planar");
+  add({.normals = float32x3, .motion = true}, false, "previous positions");
+  add({.normals = float32x3, .planar = true}, false, "planar");
   add(usual, true, "bounds");
   add({.positions = float32x4, .normals = octahedral16x2}, false, "float32x4 octahedral16x2");
   add({.positions = float16x4, .normals = octahedral8x2}, false, "float16x4 octahedral8x2");

@@ -112,7 +112,7 @@ std::vector<Layout> layouts() {
                           of("float32x3, float32x3, linear", float32x3, float32x3),
                           of("float32x3, float32x3, bounds", float32x3, float32x3),
                           of("float32x3, float32x3, planar", float32x3, float32x3)};
-  all.front().output.motion = Motion::kept;
+  all.front().output.motion = true;
   all[7].method = Method::linear;
   all[8].output.bounds = true;
   all[9].output.arrangement = samples::Arrangement::planar;
@@ -207,9 +207,8 @@ class Measurement {
     row.way = &way;
     row.tuning = tuning;
     row.instances = count;
-    row.bytes =
-        formatSize(layout.output.positions) * (layout.output.motion == Motion::none ? 1 : 2) +
-        formatSize(layout.output.normals);
+    row.bytes = formatSize(layout.output.positions) * (!layout.output.motion ? 1 : 2) +
+                formatSize(layout.output.normals);
     compare(layout, row, must(batches.output()));
     const std::size_t number = numbers_[&batches]++;
     row.run = [&batches, number] { return must(batches.skin(number)); };
@@ -219,7 +218,7 @@ class Measurement {
   /// With what the first way wrote.
   void compare(const Layout& layout, const Row& row, const std::vector<std::byte>& output) {
     // In the first frame kept positions are what stood there before.
-    if (layout.output.motion != Motion::none) return;
+    if (layout.output.motion) return;
     const std::size_t size = std::size_t{row.instances} * figureVertices * row.bytes;
     const std::size_t hash = std::hash<std::string_view>()(
         {reinterpret_cast<const char*>(output.data()), std::min(size, output.size())});

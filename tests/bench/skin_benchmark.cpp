@@ -112,7 +112,7 @@ Scene withLayout(const samples::OutputLayout& layout) {
   return scene;
 }
 
-samples::OutputLayout withMotion(Motion motion) {
+samples::OutputLayout withMotion(bool motion) {
   samples::OutputLayout layout;
   layout.motion = motion;
   return layout;
@@ -202,7 +202,7 @@ void registerAll() {
       [] { return withLayout(layoutOf(float16x3, octahedral8x2)); });
   add("extras/none", [] { return withLayout({}); });
   add("extras/bounds", [] { return withLayout(withBounds()); });
-  add("extras/previous_kept", [] { return withLayout(withMotion(Motion::kept)); });
+  add("extras/previous_kept", [] { return withLayout(withMotion(true)); });
 }
 
 const std::vector<Ratio> ratios{

@@ -922,14 +922,14 @@ Result<void> useContext(const vulkan::DeviceDescription& description) {
   Job job;
   job.mesh.byteSize = 4096;
   job.mesh.vertexCount = job.mesh.requiredJoints = job.mesh.maxInfluences = 1;
-  job.positions = {0, 12, VertexFormat::float32x3};
+  job.places[Stream::positions] = {0, 12, VertexFormat::float32x3};
   Plan plan;
-  const Batch batch{{&pose, 1}, {&job, 1}, 4096, 4096, OutputSizes::oneBuffer(4096)};
+  const Batch batch{{&pose, 1}, {&job, 1}, 4096, 4096, ByStream<std::uint64_t>::all(4096)};
   if (Result<void> made = makePlan(batch, context->limits(), {}, plan); !made) return made;
   if (Result<void> done = context->prepare(plan.pipelines()); !done) return done;
   const vulkan::BufferRange range{reinterpret_cast<VkBuffer>(std::uintptr_t{64}), 0, 4096};
   const Result<vulkan::Bindings> bindings = context->createBindings(
-      {range, range, range, range, vulkan::OutputBuffers::oneBuffer(range), range});
+      {range, range, range, range, ByStream<vulkan::BufferRange>::all(range), range});
   if (!bindings) return bindings.error();
   return context->record(reinterpret_cast<VkCommandBuffer>(std::uintptr_t{64}), plan, *bindings);
 }

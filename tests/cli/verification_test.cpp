@@ -158,7 +158,7 @@ TEST(VerificationTest, OutputCasesCombineEveryTwoFormats) {
     const std::uint32_t length =
         formatSize(layout.positions) + formatSize(layout.normals) + formatSize(layout.tangents);
     EXPECT_EQ(length % 4, 0u);
-    EXPECT_TRUE(layout.motion == Motion::none || formatSize(layout.positions) % 4 == 0);
+    EXPECT_TRUE(!layout.motion || formatSize(layout.positions) % 4 == 0);
     pairs.insert({0, layout.positions, layout.normals});
     pairs.insert({1, layout.positions, layout.tangents});
     pairs.insert({2, layout.normals, layout.tangents});

@@ -43,8 +43,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     const InstanceChange wrong{.instance = anyInstance().handle, .method = Method::logMatrix};
     calls.push_back({[this, wrong] { return system().change(wrong); }});
     calls.push_back({[this, wrong] { return system().change({&wrong, 1}); }});
-    calls.push_back(
-        {[this] { return withoutValue(system().addPose(8, {.writer = PoseWriter::gpu})); }});
+    calls.push_back({[this] { return withoutValue(system().addPose(8, {.writtenByGpu = true})); }});
     calls.push_back({[this] { return system().abandonFrame(engine_->frame()); }});
     calls.push_back({[] {
       static std::array<std::byte, 3> few;
@@ -65,7 +64,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
                     const InstanceDescription& description,
                     std::span<const MorphWeight> morphs) override {
     VertexLayout layout = description.layout;
-    const bool hasPrevious = std::exchange(layout.motion, Motion::none) != Motion::none;
+    const bool hasPrevious = std::exchange(layout.motion, false) != false;
     cpu::Instance instance;
     instance.pose = pose;
     instance.morphs = morphs;
@@ -73,7 +72,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
     const std::vector<std::byte> bytes = skinOne(mesh, description.method, layout, instance);
     const VertexPlaces places = must(placeVertices(layout, mesh.vertexCount()));
     const std::array<OutputAttribute, streamCount> attributes{
-        places.positions, places.normals, places.tangents, {}};
+        places[Stream::positions], places[Stream::normals], places[Stream::tangents], {}};
     Streams streams;
     for (std::size_t stream = 0; stream < previousStream; ++stream)
       streams[stream] = readAttribute(bytes, attributes[stream], mesh.vertexCount());

@@ -105,7 +105,7 @@ std::uint64_t hashOfMethod(Method method) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const VertexLayout& layout :
        {VertexLayout{.normals = float32x3},
-        {.normals = float32x3, .tangents = float32x4, .motion = Motion::kept},
+        {.normals = float32x3, .tangents = float32x4, .motion = true},
         {.positions = snorm16x4, .normals = octahedral8x2, .tangents = octahedral16x2},
         {.positions = float16x4, .normals = snorm8x4, .tangents = snorm16x4}}) {
     for (const bool scales : {false, true}) {
@@ -119,9 +119,9 @@ std::uint64_t hashOfMethod(Method method) {
       for (std::size_t i = 0; i < instanceCount; ++i) {
         poses.push_back(pose(numbers, scales && i != 2));
         instances[i].pose = poses[i];
-        instances[i].output = output.data() + job.places.size * i;
+        instances[i].output.fill(output.data() + job.places.size * i);
         instances[i].box = {{-3, -3, -3}, {3, 3, 3}};
-        instances[i].restartsMotion = layout.motion != Motion::none;
+        instances[i].restartsMotion = layout.motion;
       }
       job.instances = instances;
       EXPECT_TRUE(cpu::skin(job).ok());

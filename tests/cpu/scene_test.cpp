@@ -158,7 +158,7 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(result.error().message.find(words), std::string::npos) << result.error().message;
   };
-  expectRefused(engine_->addPose(jointCount, {.writer = PoseWriter::gpu}), "GPU");
+  expectRefused(engine_->addPose(jointCount, {.writtenByGpu = true}), "GPU");
   InstanceDescription description = descriptions_[0];
   description.culledOnGpu = true;
   expectRefused(engine_->addInstance(description), "culled on the GPU");
@@ -195,7 +195,7 @@ TEST(CpuSceneCreationTest, MoreOutputThanAnObjectCanHoldIsRefused) {
 // What a neighbor finds out later does not take it away either.
 TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
   VertexLayout layout = normalsToo();
-  layout.motion = Motion::kept;
+  layout.motion = true;
   add(3, layout, true);
   engine_.begin();
   writePoses(1);
@@ -223,7 +223,7 @@ TEST_F(CpuSceneTest, BoundsStayWhereAnInstanceRests) {
 TEST_F(CpuSceneTest, ANewBoxIsSkinnedAtOnceAndRestartsMotion) {
   VertexLayout layout = normalsToo();
   layout.positions = VertexFormat::snorm16x4;
-  layout.motion = Motion::kept;
+  layout.motion = true;
   add(2, layout);
   for (const InstanceHandle instance : instances_)
     must(engine_->change({.instance = instance, .updateInterval = 4}));
@@ -249,9 +249,10 @@ TEST_F(CpuSceneTest, ANewBoxIsSkinnedAtOnceAndRestartsMotion) {
       InstanceResult found;
       const std::vector<std::byte> expected = alone(i, 1, found);
       const Streams streams = engine_.read(bytes, instances_[i]);
-      EXPECT_TRUE(
-          streams[positionStream] ==
-          readAttribute(expected, must(placeVertices(layout, vertexCount)).positions, vertexCount))
+      EXPECT_TRUE(streams[positionStream] ==
+                  readAttribute(expected,
+                                must(placeVertices(layout, vertexCount))[Stream::positions],
+                                vertexCount))
           << frame << ", " << i;
       EXPECT_TRUE(streams[previousStream] == streams[positionStream]) << frame << ", " << i;
     }
@@ -285,8 +286,9 @@ TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
   const std::vector<std::byte> bytes = engine_.readOutput();
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const InstanceOutput output = must(engine_->output(instances_[i]));
-    ASSERT_EQ(output.size, outputs[i].size());
-    EXPECT_EQ(std::memcmp(bytes.data() + output.offset, outputs[i].data(), output.size), 0) << i;
+    ASSERT_EQ(output.places.size, outputs[i].size());
+    EXPECT_EQ(std::memcmp(bytes.data() + output.offset, outputs[i].data(), output.places.size), 0)
+        << i;
   }
 }
 
@@ -302,7 +304,7 @@ TEST_F(CpuSceneTest, PosesAreTheIdentityUntilTheyAreWritten) {
   const InstanceOutput output = must(engine_->output(instances_[0]));
   const OwnedMesh source = randomMesh(1, vertexCount, jointCount, 4);
   const std::vector<std::byte> positions =
-      readAttribute(engine_.readOutput(), output.positions, vertexCount);
+      readAttribute(engine_.readOutput(), output.places[Stream::positions], vertexCount);
   for (std::size_t i = 0; i < vertexCount * 3u; ++i) {
     float value;
     std::memcpy(&value, positions.data() + i * 4, 4);

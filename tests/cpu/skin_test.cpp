@@ -31,13 +31,12 @@ constexpr std::array everydayMethods{Method::linear, Method::dualQuaternion, Met
                                      Method::centerOfRotation, Method::bulgeControlled};
 
 VertexLayout layoutOf(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
-                      Motion motion = Motion::none,
-                      Arrangement arrangement = Arrangement::interleaved) {
+                      bool motion = false, bool planar = false) {
   return {.positions = positions,
           .normals = normals,
           .tangents = tangents,
           .motion = motion,
-          .arrangement = arrangement};
+          .planar = planar};
 }
 const VertexLayout plainLayout =
     layoutOf(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::none);
@@ -82,7 +81,7 @@ struct Crowd {
   void place() {
     for (std::size_t i = 0; i < instances.size(); ++i) {
       instances[i].pose = poses[i];
-      instances[i].output = output.data() + places.size * i;
+      instances[i].output.fill(output.data() + places.size * i);
     }
   }
   cpu::Job job(Method method, std::uint32_t firstVertex = 0,
@@ -105,8 +104,9 @@ struct Crowd {
     };
     const reference::SkinnedMesh expected =
         reference::skin(source.view(), poses[i], method, instances[i].morphs).value();
-    return compareWithReference(expected, {viewOf(places.positions), viewOf(places.normals),
-                                           viewOf(places.tangents), box})
+    return compareWithReference(expected,
+                                {viewOf(places[Stream::positions]), viewOf(places[Stream::normals]),
+                                 viewOf(places[Stream::tangents]), box})
         .value();
   }
 
@@ -133,11 +133,10 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
   const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
   std::vector<VertexLayout> layouts{plainLayout};
   for (const VertexFormat format : allVertexFormats) {
-    layouts.push_back(
-        layoutOf(isPositionFormat(format) ? format : VertexFormat::float32x3,
-                 isNormalFormat(format) ? format : VertexFormat::none,
-                 isTangentFormat(format) ? format : VertexFormat::none, Motion::none,
-                 layouts.size() % 2 == 0 ? Arrangement::planar : Arrangement::interleaved));
+    layouts.push_back(layoutOf(isPositionFormat(format) ? format : VertexFormat::float32x3,
+                               isNormalFormat(format) ? format : VertexFormat::none,
+                               isTangentFormat(format) ? format : VertexFormat::none, false,
+                               layouts.size() % 2 == 0 ? true : false));
   }
   for (std::size_t number = 0; number < layouts.size(); ++number) {
     const auto influences = static_cast<std::uint32_t>(number % 6 + 1);
@@ -280,7 +279,7 @@ TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
     std::vector<float> output(4001 * 6);
     cpu::Instance instance;
     instance.pose = pose;
-    instance.output = output.data();
+    instance.output.fill(output.data());
     const VertexPlaces places = placeVertices(plainLayout, 4001).value();
     ASSERT_TRUE(cpu::skin(jobOf(mesh, method, places, {&instance, 1})).ok());
     const reference::SkinnedMesh expected = reference::skin(source.view(), pose, method).value();
@@ -387,9 +386,9 @@ TEST_F(CpuSkinTest, AttributesMayStandAnywhere) {
   aligned.skin(Method::dualQuaternion);
   std::vector<std::byte> output(203 * 32);
   cpu::Job job = other.job(Method::dualQuaternion);
-  job.places.positions = {4, 32, VertexFormat::float32x3};
-  job.places.normals = {16, 32, VertexFormat::float32x3};
-  other.instances[0].output = output.data();
+  job.places[Stream::positions] = {4, 32, VertexFormat::float32x3};
+  job.places[Stream::normals] = {16, 32, VertexFormat::float32x3};
+  other.instances[0].output.fill(output.data());
   job.instances = std::span(other.instances).first(1);
   const Result<void> done = cpu::skin(job);
   ASSERT_TRUE(done.ok()) << done.error().message;
@@ -400,9 +399,8 @@ TEST_F(CpuSkinTest, AttributesMayStandAnywhere) {
 }
 
 TEST_F(CpuSkinTest, PreviousPositionsAreKeptRestartedAndSettled) {
-  Crowd crowd(
-      203, 4, Rigidity::shear,
-      layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none, Motion::kept));
+  Crowd crowd(203, 4, Rigidity::shear,
+              layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none, true));
   const std::vector<MorphWeight> before{{1, 0.5f}}, now{{0, 1}};
   const auto streamOf = [&](std::size_t i, const OutputAttribute& attribute) {
     std::vector<std::byte> bytes;
@@ -413,8 +411,8 @@ TEST_F(CpuSkinTest, PreviousPositionsAreKeptRestartedAndSettled) {
     }
     return bytes;
   };
-  const OutputAttribute& positions = crowd.places.positions;
-  OutputAttribute previous = crowd.places.previousPositions;
+  const OutputAttribute& positions = crowd.places[Stream::positions];
+  OutputAttribute previous = crowd.places[Stream::previousPositions];
   for (cpu::Instance& instance : crowd.instances) {
     instance.restartsMotion = true;
     instance.morphs = before;
@@ -459,7 +457,7 @@ TEST_F(CpuSkinTest, BytesBetweenAndBehindAttributesStay) {
   plain.skin(Method::dualQuaternion);
   std::vector<std::byte> odd(plain.places.size + 2, untouched);
   cpu::Instance instance = plain.instances[0];
-  instance.output = odd.data() + 1;
+  instance.output.fill(odd.data() + 1);
   cpu::Job job = plain.job(Method::dualQuaternion);
   job.instances = {&instance, 1};
   ASSERT_TRUE(cpu::skin(job).ok());
@@ -476,16 +474,16 @@ TEST_F(CpuSkinTest, AnyFormatMayBeAtAnyByte) {
                                                      {snorm16x3, float16x3, snorm8x4},
                                                      {float32x3, octahedral8x2, octahedral16x2}}) {
     Crowd crowd(vertexCount, 4, Rigidity::rigid,
-                layoutOf(positions, normals, tangents, Motion::none, Arrangement::planar));
+                layoutOf(positions, normals, tangents, false, true));
     crowd.skin(Method::dualQuaternion);
     std::vector<std::byte> odd(vertexCount * stride, untouched);
     cpu::Instance instance = crowd.instances[0];
-    instance.output = odd.data();
+    instance.output.fill(odd.data());
     cpu::Job job = crowd.job(Method::dualQuaternion);
     job.instances = {&instance, 1};
     std::uint32_t end = 1;
-    for (OutputAttribute* attribute :
-         {&job.places.positions, &job.places.normals, &job.places.tangents}) {
+    for (OutputAttribute* attribute : {&job.places[Stream::positions], &job.places[Stream::normals],
+                                       &job.places[Stream::tangents]}) {
       attribute->offset = end;
       attribute->stride = stride;
       end += formatSize(attribute->format);
@@ -493,9 +491,10 @@ TEST_F(CpuSkinTest, AnyFormatMayBeAtAnyByte) {
     ASSERT_TRUE(cpu::skin(job).ok());
     for (std::size_t vertex = 0; vertex < vertexCount; ++vertex) {
       const std::span<std::byte> bytes = std::span(odd).subspan(vertex * stride, stride);
-      for (const auto& [here, there] : {std::pair{&job.places.positions, &crowd.places.positions},
-                                        {&job.places.normals, &crowd.places.normals},
-                                        {&job.places.tangents, &crowd.places.tangents}}) {
+      for (const auto& [here, there] :
+           {std::pair{&job.places[Stream::positions], &crowd.places[Stream::positions]},
+            {&job.places[Stream::normals], &crowd.places[Stream::normals]},
+            {&job.places[Stream::tangents], &crowd.places[Stream::tangents]}}) {
         const std::size_t size = formatSize(here->format);
         EXPECT_EQ(std::memcmp(bytes.data() + here->offset,
                               crowd.output.data() + there->offset + vertex * size, size),
@@ -509,16 +508,17 @@ TEST_F(CpuSkinTest, AnyFormatMayBeAtAnyByte) {
 
 // An array for each attribute, as programs without a GPU like it.
 TEST_F(CpuSkinTest, AttributesMayGoToArraysOfTheirOwn) {
-  const VertexLayout layout = layoutOf(VertexFormat::float32x3, VertexFormat::float32x3,
-                                       VertexFormat::float32x4, Motion::kept);
+  const VertexLayout layout =
+      layoutOf(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::float32x4, true);
   Crowd together(100, 4, Rigidity::rigid, layout);
   for (cpu::Instance& instance : together.instances) instance.restartsMotion = true;
   together.skin(Method::dualQuaternion);
   Crowd apart(100, 4, Rigidity::rigid, layout);
   cpu::Job job = apart.job(Method::dualQuaternion);
-  job.places.positions = job.places.previousPositions = {0, 12, VertexFormat::float32x3};
-  job.places.normals = {0, 12, VertexFormat::float32x3};
-  job.places.tangents = {4, 20, VertexFormat::float32x4};
+  job.places[Stream::positions] =
+      job.places[Stream::previousPositions] = {0, 12, VertexFormat::float32x3};
+  job.places[Stream::normals] = {0, 12, VertexFormat::float32x3};
+  job.places[Stream::tangents] = {4, 20, VertexFormat::float32x4};
   for (std::size_t i = 0; i < instanceCount; ++i) {
     std::vector<float> positions(300), normals(300), tangents(501), previous(300);
     apart.instances[i].output = {positions.data(), normals.data(), tangents.data(),
@@ -537,10 +537,10 @@ TEST_F(CpuSkinTest, AttributesMayGoToArraysOfTheirOwn) {
                   0);
       }
     };
-    expectSame(positions.data(), 3, 3, together.places.positions);
-    expectSame(normals.data(), 3, 3, together.places.normals);
-    expectSame(tangents.data() + 1, 5, 4, together.places.tangents);
-    expectSame(previous.data(), 3, 3, together.places.previousPositions);
+    expectSame(positions.data(), 3, 3, together.places[Stream::positions]);
+    expectSame(normals.data(), 3, 3, together.places[Stream::normals]);
+    expectSame(tangents.data() + 1, 5, 4, together.places[Stream::tangents]);
+    expectSame(previous.data(), 3, 3, together.places[Stream::previousPositions]);
     EXPECT_EQ(tangents[0], 0.0f);
     EXPECT_EQ(tangents[5], 0.0f);
   }
@@ -556,7 +556,7 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
   for (const VertexLayout& layout :
        {plainLayout, layoutOf(VertexFormat::float16x4, VertexFormat::none, VertexFormat::none)}) {
     Crowd crowd(203, 4, Rigidity::rigid, layout);
-    const std::uint32_t stride = crowd.places.positions.stride;
+    const std::uint32_t stride = crowd.places[Stream::positions].stride;
     for (const auto& [begin, end] : {std::pair{13u, 101u},
                                      {16u, 19u},
                                      {5u, 5u},
@@ -640,10 +640,10 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   bad.firstVertex = 204;
   expectRefused(bad, "firstVertex of 204 is after its last vertex");
   bad = good;
-  bad.places.normals.format = static_cast<VertexFormat>(99);
+  bad.places[Stream::normals].format = static_cast<VertexFormat>(99);
   expectRefused(bad, "normals");
   bad = good;
-  bad.places.positions.stride = 4;
+  bad.places[Stream::positions].stride = 4;
   expectRefused(bad, "positions");
 
   const auto expectBadInstance = [&](const auto& change, const std::string& text) {
@@ -655,8 +655,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   };
   const MorphWeight unknown{7, 1};
   const std::array<MorphWeight, 2> falling{{{2, 1}, {1, 1}}};
-  expectBadInstance([](cpu::Instance& i) { i.output = nullptr; },
-                    " has no output for its positions");
+  expectBadInstance([](cpu::Instance& i) { i.output = {}; }, " has no output for its positions");
   expectBadInstance([](cpu::Instance& i) { i.pose = i.pose.first(3); }, ": its pose has 3 joints");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = {&unknown, 1}; }, "");
   expectBadInstance([&](cpu::Instance& i) { i.morphs = falling; },
@@ -689,7 +688,7 @@ TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
     float skinned[3] = {};
     cpu::Instance instance;
     instance.pose = pose;
-    instance.output = skinned;
+    instance.output.fill(skinned);
     const VertexPlaces places = placeVertices({}, 1).value();
     ASSERT_TRUE(cpu::skin(jobOf(*mesh, cpu::Job{}.method, places, {&instance, 1})).ok());
     EXPECT_NEAR(skinned[2], 3, 1e-5);

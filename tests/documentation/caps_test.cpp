@@ -50,7 +50,7 @@ std::set<std::string> allModules() {
       PipelineNeeds needs;
       needs.method = method;
       needs.layout.normals = VertexFormat::float32x3;
-      needs.layout.motion = kind / 8 % 2 != 0 ? Motion::kept : Motion::none;
+      needs.layout.motion = kind / 8 % 2 != 0 ? true : false;
       needs.culledOnGpu = kind / 16 != 0;
       for (const PipelineId id : *pipelines(needs, limits, {}))
         modules.insert(vulkan::pipelineDescription(id)->module);

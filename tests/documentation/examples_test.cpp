@@ -193,7 +193,7 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   // [/cpu-frame]
 
   std::array<float, 18> floats{};
-  ASSERT_EQ(output.size, sizeof(floats));
+  ASSERT_EQ(output.places.size, sizeof(floats));
   std::memcpy(floats.data(), skinned, sizeof(floats));
   EXPECT_FLOAT_EQ(floats[0], 0);
   EXPECT_FLOAT_EQ(floats[6], 3);

@@ -170,15 +170,15 @@ class AccelerationStructureTest : public DeviceTest,
     const PoseDescription palette{jointCount, 0, false};
     Job job;
     job.mesh = packed_->info();
-    job.positions = GetParam().attribute;
+    job.places[Stream::positions] = GetParam().attribute;
     job.box = pose.box;
     Batch batch;
     batch.poses = {&palette, 1};
     batch.jobs = {&job, 1};
     batch.meshesSize = meshes_.bytes().size();
     batch.posesSize = pose.joints.size() * sizeof(JointMatrix);
-    batch.outputs = OutputSizes::oneBuffer(job.positions.offset +
-                                           std::uint64_t{vertexCount} * job.positions.stride);
+    batch.outputSizes.fill(job.places[Stream::positions].offset +
+                           std::uint64_t{vertexCount} * job.places[Stream::positions].stride);
     const Result<void> planned = makePlan(batch, context().limits(), {}, pose.plan);
     ASSERT_TRUE(planned.ok()) << planned.error().message;
     ASSERT_TRUE(context().prepare(pose.plan.pipelines()).ok());
@@ -199,7 +199,7 @@ class AccelerationStructureTest : public DeviceTest,
     ASSERT_TRUE(writeTables(pose.plan, pose.tables.bytes()).ok());
     Result<vulkan::Bindings> bindings = context().createBindings(
         {meshes_.range(), pose.matrices.range(), pose.tables.range(), pose.palettes.range(),
-         vulkan::OutputBuffers::oneBuffer(output_.range()), pose.results.range()});
+         ByStream<vulkan::BufferRange>::all(output_.range()), pose.results.range()});
     ASSERT_TRUE(bindings.ok()) << bindings.error().message;
     pose.bindings.emplace(std::move(*bindings));
   }
@@ -239,7 +239,7 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   void submit() {
-    barrier(vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::hostRead));
+    barrier(vulkan::barrierBetween(Use::dermis, Use::hostRead));
     device().functions().EndCommandBuffer(commandBuffer_);
     const Result<void> done = device().submitAndWait(commandBuffer_);
     EXPECT_TRUE(done.ok()) << (done ? "" : done.error().message);
@@ -251,7 +251,7 @@ class AccelerationStructureTest : public DeviceTest,
                     AccelerationStructure& bottom, Scene& scene) {
     const Result<void> recorded = context().record(commandBuffer_, pose.plan, *pose.bindings);
     ASSERT_TRUE(recorded.ok()) << recorded.error().message;
-    barrier(vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::accelerationStructureBuild));
+    barrier(vulkan::barrierBetween(Use::dermis, Use::accelerationStructureBuild));
     bottom.record(commandBuffer_, mode, geometry(pose));
     structureBarrier();
     scene.build(commandBuffer_);
@@ -297,8 +297,7 @@ TEST_P(AccelerationStructureTest, HoldsWhatWasSkinnedWhenBuiltAndWhenRefitted) {
   ASSERT_NO_FATAL_FAILURE(
       skinAndBuild(first, VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR, bottom, scene));
   caster.record(commandBuffer_, scene, first.rays);
-  barrier(vulkan::barrierBetween(vulkan::Use::accelerationStructureBuild | vulkan::Use::dermis,
-                                 vulkan::Use::dermis));
+  barrier(vulkan::barrierBetween(Use::accelerationStructureBuild | Use::dermis, Use::dermis));
   structureBarrier();
   ASSERT_NO_FATAL_FAILURE(
       skinAndBuild(second, VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR, bottom, scene));

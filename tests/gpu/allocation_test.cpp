@@ -95,9 +95,9 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
   std::vector<PoseHandle> cpuPoses, gpuPoses;
   std::vector<InstanceHandle> instances;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const PoseWriter writer = i % 3 == 0 ? PoseWriter::gpu : PoseWriter::cpu;
-    instance.pose = must(system->scene().addPose(8, {.writer = writer}));
-    (writer == PoseWriter::gpu ? gpuPoses : cpuPoses).push_back(instance.pose);
+    const bool writtenByGpu = i % 3 == 0 ? true : false;
+    instance.pose = must(system->scene().addPose(8, {.writtenByGpu = writtenByGpu}));
+    (writtenByGpu ? gpuPoses : cpuPoses).push_back(instance.pose);
     instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;
     instance.bounds = i % 5 == 0;
     instance.culledOnGpu = i % 7 == 0;
@@ -228,7 +228,7 @@ TEST(CpuAllocationTest, WarmJobsAllocateNothing) {
       output.resize(job.places.size * instances.size());
       for (std::size_t i = 0; i < instances.size(); ++i) {
         instances[i].pose = i % 2 == 0 ? rigid : sheared;
-        instances[i].output = output.data() + job.places.size * i;
+        instances[i].output.fill(output.data() + job.places.size * i);
       }
       job.instances = instances;
       must(cpu::skin(job));

@@ -26,7 +26,7 @@ class KernelReloadTest : public SystemTest {
     folder_.emplace(::testing::UnitTest::GetInstance()->current_test_info()->name());
     // [create]
     // The folder of the GLSL files, and one for compiled modules (here none).
-    compiler_.emplace(must(RuntimeCompiler::create({folder_->path(), {}})));
+    compiler_.emplace(must(RuntimeCompiler::create(folder_->path())));
     vulkan::DeviceDescription description = device().description();
     description.kernelSource = compiler_->source();
     context_.emplace(must(vulkan::Context::create(description)));
@@ -87,7 +87,7 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
             must(samples::runBatch(device(), context(), {&request, 1})).instances[0].streams)
       << "the library's kernels";
   static_cast<void>(reload());  // files that were written just now may be read once more
-  const std::uint32_t compiled = compiler_->statistics().compiled;
+  const std::uint32_t compiled = compiler_->compiledModules();
   EXPECT_EQ(reload().changed, 0u);
 
   folder_->edit("skin.comp", ShaderFolder::storedPosition, ShaderFolder::movedPosition);
@@ -95,7 +95,7 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
   const KernelReload moved = reload();
   EXPECT_TRUE(namesOnly(moved.replaced, "skin")) << moved.replaced.size();
   EXPECT_EQ(moved.replaced.size(), moved.changed);
-  EXPECT_EQ(compiler_->statistics().compiled, compiled + moved.changed) << "not the palette's";
+  EXPECT_EQ(compiler_->compiledModules(), compiled + moved.changed) << "not the palette's";
   EXPECT_GE(moved.pipelines, moved.replaced.size());
   expectMoved(skin()[positionStream], original[positionStream]);
   EXPECT_EQ(skin()[normalStream], original[normalStream]);

@@ -23,7 +23,7 @@ class MotionTest : public DeviceTest {
     DeviceTest::SetUp();
     if (device_ == nullptr) return;
     samples::RunOptions options;
-    options.output.motion = Motion::kept;
+    options.output.motion = true;
     runner_ = samples::VulkanTarget(device(), context()).runner(options);
     for (std::uint32_t pose = 0; pose < 40; ++pose)
       poses_.push_back(randomPose(pose, jointCount, Rigidity::rigid));

@@ -36,7 +36,7 @@ class SystemCompactionTest : public SystemTest {
   std::uint64_t offsetOf(std::uint32_t number) {
     return must(scene().output(instances_[number])).offset;
   }
-  std::uint64_t sizeOfOne() { return must(scene().output(instances_[1])).size; }
+  std::uint64_t sizeOfOne() { return must(scene().output(instances_[1])).places.size; }
   void remove(std::initializer_list<std::uint32_t> numbers) {
     engine_->begin();
     for (const std::uint32_t number : numbers) must(scene().removeInstance(instances_[number]));
@@ -133,7 +133,7 @@ TEST_F(SystemCompactionTest, TheOldPlaceStaysUntilTheFrameIsComplete) {
 
 TEST_F(SystemCompactionTest, NoMoreBytesThanWereAllowed) {
   remove({0, 1, 2});
-  const std::uint64_t size = must(scene().output(instances_[3])).size;
+  const std::uint64_t size = must(scene().output(instances_[3])).places.size;
   engine_->begin();
   EXPECT_EQ(scene().compact(size - 1), 0u);
   engine_->submit();
@@ -169,8 +169,8 @@ TEST_F(SystemCompactionTest, WhatGoesBeforeItMovesIsNoTrouble) {
   EXPECT_TRUE(engine_->read(instances_[4]) == alone(coarse, systemPose(4), instance_));
   for (int i = 0; i < 4; ++i) engine_->runFrame();
   const StoreStatistics outputs = scene().statistics().outputs;
-  EXPECT_EQ(outputs.used,
-            2 * must(scene().output(instances_[2])).size + must(scene().output(instances_[4])).size)
+  EXPECT_EQ(outputs.used, 2 * must(scene().output(instances_[2])).places.size +
+                              must(scene().output(instances_[4])).places.size)
       << "no place is lost";
 }
 

@@ -129,8 +129,7 @@ TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
   for (int frame = 0; frame < 12; ++frame) {
     engine.begin(2);
     instance.mesh = engine.addMesh(mesh);
-    instance.pose = engine.addPose(systemPose(1),
-                                   {.writer = frame % 2 == 0 ? PoseWriter::cpu : PoseWriter::gpu});
+    instance.pose = engine.addPose(systemPose(1), {.writtenByGpu = frame % 2 == 0 ? false : true});
     for (int i = 0; i <= frame * 2; ++i) instances.push_back(engine.addInstance(instance));
     engine.submit();
   }
@@ -160,8 +159,8 @@ TEST_F(SystemGrowthTest, BeyondTheMaximumAddingFailsWithASentence) {
   const PoseHandle pose = must(system.scene().addPose(8));
   must(system.scene().addPose(12));
   expectRefused(system.scene().addPose(1), "the CPU writes hold 20 joints, of which 20 are in use");
-  must(system.scene().addPose(20, {.writer = PoseWriter::gpu}));
-  expectRefused(system.scene().addPose(1, {.writer = PoseWriter::gpu}),
+  must(system.scene().addPose(20, {.writtenByGpu = true}));
+  expectRefused(system.scene().addPose(1, {.writtenByGpu = true}),
                 "the GPU writes hold 20 joints, of which 20 are in use; their maximum is 20");
   InstanceDescription instance{.mesh = first, .pose = pose, .layout = motionLayout()};
   instance.bounds = true;
@@ -229,8 +228,7 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   for (std::uint32_t i = 0; i < 6; ++i) {
     if (i % 3 == 0) instance.mesh = engine.addMesh(mesh);
     instance.method = i % 2 == 0 ? Method::linear : Method::dualQuaternion;
-    instance.pose =
-        engine.addPose(systemPose(i), {.writer = i < 3 ? PoseWriter::gpu : PoseWriter::cpu});
+    instance.pose = engine.addPose(systemPose(i), {.writtenByGpu = i < 3 ? true : false});
     descriptions.push_back(instance);
     instances.push_back(engine.addInstance(instance));
   }
@@ -253,7 +251,7 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   std::uint32_t count = 0;
   for (; another; ++count) another = engine->addPose(100);
   EXPECT_EQ(count - 1, (part - 3 * 8 * 2 * sizeof(JointMatrix)) / (100 * 2 * sizeof(JointMatrix)));
-  EXPECT_FALSE(engine->addPose(2000, {.writer = PoseWriter::gpu}).ok());
+  EXPECT_FALSE(engine->addPose(2000, {.writtenByGpu = true}).ok());
 }
 
 // Bytes behind the last whole joint, or mesh, are not bound.
@@ -278,7 +276,7 @@ TEST_F(SystemGrowthTest, RangesOfNoWholeJointsAreNotBoundToTheirEnd) {
   instance.layout = motionLayout();
   const PackedMesh mesh = systemMesh(1, 100);
   instance.mesh = engine.addMesh(mesh);
-  instance.pose = engine.addPose(systemPose(1), {.writer = PoseWriter::gpu});
+  instance.pose = engine.addPose(systemPose(1), {.writtenByGpu = true});
   const InstanceHandle handle = engine.addInstance(instance);
   engine.submit();
   expectSkinned(engine.read(handle), alone(mesh, systemPose(1), instance));
@@ -311,7 +309,7 @@ TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {
 TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
   SceneRecorder system = must(SceneRecorder::create(context(), tiny()));
   std::vector<PoseHandle> poses(1000);
-  must(system.scene().addPoses(poses, 7, {.writer = PoseWriter::gpu}));
+  must(system.scene().addPoses(poses, 7, {.writtenByGpu = true}));
   const BufferRange first = must(system.poseRange(poses[0]));
   EXPECT_EQ(first.size, 7 * sizeof(JointMatrix));
   for (std::uint32_t i = 0; i < poses.size(); ++i) {
@@ -320,10 +318,10 @@ TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
     EXPECT_EQ(range.offset, first.offset + i * first.size);
   }
   std::vector<PoseHandle> others(50);
-  must(system.scene().addPoses(others, 300, {.writer = PoseWriter::gpu}));
+  must(system.scene().addPoses(others, 300, {.writtenByGpu = true}));
   // On lavapipe these are multiples of the alignment anyway, under profiles of other devices not.
-  const PoseHandle single = must(system.scene().addPose(1, {.writer = PoseWriter::gpu}));
-  const PoseHandle next = must(system.scene().addPose(1, {.writer = PoseWriter::gpu}));
+  const PoseHandle single = must(system.scene().addPose(1, {.writtenByGpu = true}));
+  const PoseHandle next = must(system.scene().addPose(1, {.writtenByGpu = true}));
   for (const PoseHandle bound : {poses[0], others[0], single, next}) {
     EXPECT_EQ(
         must(system.poseRange(bound)).offset % context().limits().minStorageBufferOffsetAlignment,
@@ -335,7 +333,7 @@ TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {
 
 TEST_F(SystemGrowthTest, EachPoseIsWrittenByTheOneWhoDoes) {
   SystemEngine engine(device(), context(), tiny());
-  const PoseHandle ofGpu = must(engine->addPose(4, {.writer = PoseWriter::gpu}));
+  const PoseHandle ofGpu = must(engine->addPose(4, {.writtenByGpu = true}));
   const PoseHandle ofCpu = must(engine->addPose(4));
   engine.begin();
   const auto expectRefused = [](const auto& result, const std::string& text) {
@@ -401,7 +399,7 @@ TEST_F(SystemGrowthTest, MarkedPosesAreSkinnedAndOthersRest) {
   std::vector<InstanceHandle> instances;
   std::vector<PoseHandle> poses;
   for (std::uint32_t i = 0; i < 4; ++i) {
-    poses.push_back(engine.addPose(systemPose(i), {.writer = PoseWriter::gpu}));
+    poses.push_back(engine.addPose(systemPose(i), {.writtenByGpu = true}));
     instance.pose = poses.back();
     instances.push_back(engine.addInstance(instance));
   }

@@ -13,11 +13,10 @@ namespace {
 constexpr std::byte poison{0xa5};
 
 VertexLayout layoutOf(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
-                      Arrangement arrangement = Arrangement::interleaved,
-                      std::uint32_t stride = 0) {
+                      bool planar = false, std::uint32_t stride = 0) {
   VertexLayout layout{positions, normals, tangents};
-  layout.motion = Motion::kept;
-  layout.arrangement = arrangement;
+  layout.motion = true;
+  layout.planar = planar;
   layout.stride = stride;
   return layout;
 }
@@ -62,20 +61,20 @@ class SystemLayoutTest : public SystemTest {
 
 void SystemLayoutTest::expectPlace(const InstanceOutput& output, const VertexLayout& layout,
                                    std::uint32_t vertexCount) const {
-  EXPECT_GT(output.size, 0u);
-  EXPECT_EQ(output.positions.format, layout.positions);
-  EXPECT_EQ(output.normals.format, layout.normals);
-  EXPECT_EQ(output.tangents.format, layout.tangents);
-  EXPECT_EQ(output.previousPositions.format,
-            layout.motion != Motion::none ? layout.positions : VertexFormat::none);
+  EXPECT_GT(output.places.size, 0u);
+  EXPECT_EQ(output.places[Stream::positions].format, layout.positions);
+  EXPECT_EQ(output.places[Stream::normals].format, layout.normals);
+  EXPECT_EQ(output.places[Stream::tangents].format, layout.tangents);
+  EXPECT_EQ(output.places[Stream::previousPositions].format,
+            layout.motion ? layout.positions : VertexFormat::none);
   std::uint32_t used = 0;
-  for (const OutputAttribute& attribute : attributesOf(output)) {
+  for (const OutputAttribute& attribute : output.places.attributes) {
     if (attribute.format == VertexFormat::none) continue;
     const std::uint32_t size = formatSize(attribute.format);
     EXPECT_GE(attribute.offset, output.offset);
     EXPECT_LE(attribute.offset + std::uint64_t{vertexCount - 1} * attribute.stride + size,
-              output.offset + output.size);
-    if (layout.arrangement == Arrangement::planar) {
+              output.offset + output.places.size);
+    if (layout.planar) {
       EXPECT_EQ(attribute.offset % 16, 0u);
     } else {
       // One after the other, each where its components may stand.
@@ -85,9 +84,9 @@ void SystemLayoutTest::expectPlace(const InstanceOutput& output, const VertexLay
     }
     used += size;
   }
-  if (layout.arrangement == Arrangement::interleaved) {
+  if (!layout.planar) {
     const std::uint32_t stride = layout.stride != 0 ? layout.stride : (used + 3) / 4 * 4;
-    for (const OutputAttribute& attribute : attributesOf(output)) {
+    for (const OutputAttribute& attribute : output.places.attributes) {
       EXPECT_TRUE(attribute.format == VertexFormat::none || attribute.stride == stride);
     }
     EXPECT_EQ(output.offset % stride, 0u);
@@ -104,7 +103,7 @@ void SystemLayoutTest::expectOutput(SystemEngine& engine) {
     expectPlace(output, placed.description.layout, vertexCount);
     const Streams expected = alone(meshes_[placed.mesh], pose_, placed.description);
     EXPECT_TRUE(engine.read(bytes, placed.handle) == expected);
-    for (const OutputAttribute& attribute : attributesOf(output)) {
+    for (const OutputAttribute& attribute : output.places.attributes) {
       for (std::size_t vertex = 0; vertex < vertexCount; ++vertex) {
         const std::size_t place = attribute.offset + vertex * attribute.stride;
         for (std::size_t byte = 0; byte < formatSize(attribute.format); ++byte) {
@@ -124,10 +123,10 @@ TEST_F(SystemLayoutTest, WholeWordsStandWhereTheLayoutSays) {
   using enum VertexFormat;
   const VertexLayout layouts[] = {
       layoutOf(float32x3, none, none),
-      layoutOf(float32x3, float32x3, float32x4, Arrangement::interleaved, 76),
-      layoutOf(float32x4, octahedral16x2, snorm8x4, Arrangement::planar),
-      layoutOf(float16x4, snorm8x4, octahedral16x2, Arrangement::interleaved, 48),
-      layoutOf(snorm16x4, float16x4, none, Arrangement::planar),
+      layoutOf(float32x3, float32x3, float32x4, false, 76),
+      layoutOf(float32x4, octahedral16x2, snorm8x4, true),
+      layoutOf(float16x4, snorm8x4, octahedral16x2, false, 48),
+      layoutOf(snorm16x4, float16x4, none, true),
   };
   SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
@@ -138,13 +137,13 @@ TEST_F(SystemLayoutTest, AttributesOfHalfWordsShareWords) {
   using enum VertexFormat;
   VertexLayout layouts[] = {
       layoutOf(float16x3, octahedral8x2, none),
-      layoutOf(snorm16x3, float16x3, octahedral16x2, Arrangement::interleaved, 24),
+      layoutOf(snorm16x3, float16x3, octahedral16x2, false, 24),
       layoutOf(float16x3, float16x4, octahedral8x2),
       layoutOf(float16x3, none, octahedral8x2),
       layoutOf(float32x3, octahedral8x2, octahedral8x2),
   };
   for (VertexLayout& layout : layouts) {
-    if (formatSize(layout.positions) % 4 != 0) layout.motion = Motion::none;
+    if (formatSize(layout.positions) % 4 != 0) layout.motion = false;
   }
   SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
@@ -171,8 +170,8 @@ TEST_F(SystemLayoutTest, EachInstanceHasABoxOfItsOwn) {
 
 // What the engine wrote between the attributes is still there when all of them are skinned again.
 TEST_F(SystemLayoutTest, TheEnginesOwnAttributesStay) {
-  const VertexLayout layouts[] = {layoutOf(VertexFormat::float32x3, VertexFormat::float32x3,
-                                           VertexFormat::none, Arrangement::interleaved, 64)};
+  const VertexLayout layouts[] = {
+      layoutOf(VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::none, false, 64)};
   SystemEngine engine(device(), context(), description());
   fillEngine(engine, layouts);
   engine.finish();

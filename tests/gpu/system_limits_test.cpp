@@ -92,9 +92,8 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
   for (const bool pushDescriptors : {true, false}) {
     useDevice(pushDescriptors);
     if (device_ == nullptr) return;
-    for (const Arrangement arrangement : {Arrangement::interleaved, Arrangement::planar}) {
-      if (!pushDescriptors && arrangement == Arrangement::planar)
-        continue;  // DeviceLimits::separateRanges
+    for (const bool planar : {false, true}) {
+      if (!pushDescriptors && planar) continue;  // DeviceLimits::separateRanges
       InterceptedDevice small(device().description());
       small.changeLimits(
           [](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = 256 << 10; });
@@ -106,7 +105,7 @@ TEST_F(SystemLimitsTest, OutputLargerThanARangeThatIsNarrow) {
       SystemEngine engine(device(), narrow, system);
       engine.begin();
       VertexLayout layout = motionLayout();
-      layout.arrangement = arrangement;
+      layout.planar = planar;
       crowd_.clear();
       addCrowd(engine, 60, layout);
       engine.submit();

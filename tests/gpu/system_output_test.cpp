@@ -114,7 +114,7 @@ TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   for (std::uint32_t i = 0; i < 12; ++i) {
     instance.pose = engine.addPose(systemPose(i));
     instance.layout = motionLayout();
-    instance.layout.arrangement = i % 2 == 0 ? Arrangement::interleaved : Arrangement::planar;
+    instance.layout.planar = i % 2 == 0 ? false : true;
     descriptions.push_back(instance);
     instances.push_back(engine.addInstance(instance));
   }
@@ -130,10 +130,10 @@ TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   for (std::uint32_t i = 1; i < 12; ++i) {
     const InstanceOutput output = must(engine->output(instances[i]));
     EXPECT_GE(output.offset, begin);
-    if (descriptions[i].layout.arrangement == Arrangement::interleaved) {
-      EXPECT_EQ(output.offset % output.positions.stride, 0u) << "for firstVertex";
+    if (!descriptions[i].layout.planar) {
+      EXPECT_EQ(output.offset % output.places[Stream::positions].stride, 0u) << "for firstVertex";
     }
-    EXPECT_LE(output.offset + output.size, begin + size);
+    EXPECT_LE(output.offset + output.places.size, begin + size);
     expectSkinned(engine.read(bytes, instances[i]), alone(mesh, systemPose(i), descriptions[i]));
   }
   for (std::uint64_t byte = 0; byte < whole; ++byte) {

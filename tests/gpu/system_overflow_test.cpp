@@ -147,7 +147,7 @@ TEST_F(SystemOverflowTest, AFailedRecordChangesNothingThatIsShown) {
   const InstanceOutput after = must(scene().output(first));
   EXPECT_EQ(after.mesh, instance_.mesh);
   EXPECT_EQ(after.offset, before.offset);
-  EXPECT_EQ(after.size, before.size);
+  EXPECT_EQ(after.places.size, before.places.size);
 }
 
 // Every switch takes room beside what is shown, and gives it back.

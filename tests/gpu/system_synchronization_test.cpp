@@ -99,12 +99,10 @@ class BusyScene {
  private:
   void cull(VkCommandBuffer commandBuffer) {
     // The last frame's words have been read by a kernel.
-    engine_.recordBarrier(commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyWrite));
+    engine_.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyWrite));
     device_.functions().CmdFillBuffer(commandBuffer, visibility_.handle(), 0, VK_WHOLE_SIZE,
                                       engine_.frame() % 5 != 0 ? 1 : 0);
-    engine_.recordBarrier(commandBuffer,
-                          vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::dermis));
+    engine_.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::dermis));
   }
   void draw(VkCommandBuffer commandBuffer) {
     const VkBufferCopy all{0, 0, size_};
@@ -219,11 +217,9 @@ class EventfulFrames {
     };
     engine.beforeRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.culls) return;
-      engine.recordBarrier(commandBuffer,
-                           vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::copyWrite));
+      engine.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyWrite));
       device.functions().CmdFillBuffer(commandBuffer, words.handle(), 0, VK_WHOLE_SIZE, 1);
-      engine.recordBarrier(commandBuffer,
-                           vulkan::barrierBetween(vulkan::Use::copyWrite, vulkan::Use::dermis));
+      engine.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::dermis));
     };
     engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.draws) return;
@@ -241,8 +237,7 @@ class EventfulFrames {
       if (frame != 3) instance.mesh = engine.addMesh(systemMesh(frame, 60));
       for (std::uint32_t i = 0; frame != 3 && i < 4; ++i) {
         const bool isOfGpu = events.gpuPoses && i % 2 == 0;
-        poses.push_back(
-            engine.addPose(systemPose(i), {.writer = isOfGpu ? PoseWriter::gpu : PoseWriter::cpu}));
+        poses.push_back(engine.addPose(systemPose(i), {.writtenByGpu = isOfGpu ? true : false}));
         instance.pose = poses.back();
         instance.culledOnGpu = events.culls && i < 2;
         instance.method = i == 3 ? Method::linear : Method::dualQuaternion;

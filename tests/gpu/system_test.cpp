@@ -74,7 +74,7 @@ Streams SystemTest::alone(const PackedMesh& mesh, std::span<const JointMatrix> p
       must(samples::runBatch(device(), context(), {&request, 1}, options));
   expectReference(result.instances[0], request);
   Streams streams = std::move(result.instances[0].streams);
-  if (description.layout.motion != Motion::none) streams[previousStream] = streams[positionStream];
+  if (description.layout.motion) streams[previousStream] = streams[positionStream];
   return streams;
 }
 

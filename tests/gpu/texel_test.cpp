@@ -27,9 +27,9 @@ std::vector<samples::OutputLayout> layouts() {
   layouts[1].arrangement = samples::Arrangement::separate;
   layouts[2].positions = snorm16x4;
   layouts[2].tangents = float32x4;
-  layouts[2].motion = Motion::kept;
+  layouts[2].motion = true;
   layouts[2].bounds = true;
-  layouts[3].motion = Motion::kept;
+  layouts[3].motion = true;
   layouts[3].normals = none;
   layouts[3].arrangement = samples::Arrangement::planar;
   return layouts;
@@ -147,7 +147,7 @@ TEST_F(TexelTest, StoresOfAnyWidthGiveTheSameBits) {
   using enum VertexFormat;
   struct Case {
     VertexFormat positions, normals, tangents;
-    Motion motion = Motion::none;
+    bool motion = false;
   };
   Rigs rigs(Method::dualQuaternion, {4});
   for (samples::SkinRequest& request : rigs.requests) {
@@ -167,10 +167,10 @@ TEST_F(TexelTest, StoresOfAnyWidthGiveTheSameBits) {
        {Case{float32x3, float32x3, none}, Case{float32x3, octahedral16x2, none},
         Case{float16x4, octahedral16x2, none}, Case{snorm16x4, snorm8x4, snorm8x4},
         Case{float32x4, float32x4, none}, Case{float32x4, float32x4, float32x4},
-        Case{float32x3, float32x3, none, Motion::kept}, Case{float16x4, none, none},
+        Case{float32x3, float32x3, none, true}, Case{float16x4, none, none},
         Case{float16x3, octahedral8x2, none}, Case{float16x3, octahedral8x2, octahedral16x2},
         Case{snorm16x3, octahedral8x2, none}, Case{float16x3, snorm16x3, octahedral16x2},
-        Case{float32x3, octahedral8x2, octahedral8x2, Motion::kept},
+        Case{float32x3, octahedral8x2, octahedral8x2, true},
         Case{float16x3, float16x4, octahedral8x2}}) {
     samples::OutputLayout layout;
     layout.positions = formats.positions;

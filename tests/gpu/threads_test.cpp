@@ -103,8 +103,7 @@ class ThreadsTest : public DeviceTest {
 
   /// Each repeat uses the palettes and the output of the one before.
   void recordEdge(VkCommandBuffer commandBuffer) {
-    context().recordBarrier(commandBuffer,
-                            vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::dermis));
+    context().recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
   }
 
   samples::MappedBuffer upload(const PackedMesh& mesh) {
@@ -124,7 +123,7 @@ class ThreadsTest : public DeviceTest {
                                    work.matrices.range(),
                                    work.tables.range(),
                                    work.palettes.range(),
-                                   vulkan::OutputBuffers::oneBuffer(work.output.range()),
+                                   ByStream<vulkan::BufferRange>::all(work.output.range()),
                                    {}});
   }
 
@@ -134,14 +133,14 @@ class ThreadsTest : public DeviceTest {
     const PoseDescription palette{10, 0, false};
     Job job;
     job.mesh = mesh.info();
-    job.positions = {0, 24, VertexFormat::float32x3};
-    job.normals = {12, 24, VertexFormat::float32x3};
+    job.places[Stream::positions] = {0, 24, VertexFormat::float32x3};
+    job.places[Stream::normals] = {12, 24, VertexFormat::float32x3};
     Batch batch;
     batch.poses = {&palette, 1};
     batch.jobs = {&job, 1};
     batch.meshesSize = mesh.bytes().size();
     batch.posesSize = pose.size() * sizeof(JointMatrix);
-    batch.outputs = OutputSizes::oneBuffer(std::uint64_t{mesh.vertexCount()} * 24);
+    batch.outputSizes.fill(std::uint64_t{mesh.vertexCount()} * 24);
     ASSERT_TRUE(makePlan(batch, context().limits(), {}, work.plan).ok());
     const auto make = [&](BufferRole role) {
       const BufferRequirement requirement = work.plan.buffer(role);
@@ -438,9 +437,9 @@ TEST_F(ThreadsTest, ManyRecordSystemsOfOneContext) {
     const Engine& engine = engines[thread];
     std::vector<std::byte> bytes;
     for (const InstanceHandle instance : engine.instances) {
-      const std::vector<std::byte> one =
-          readAttribute(engine.output.bytes(),
-                        must(engine.system->scene().output(instance)).positions, vertexCount);
+      const std::vector<std::byte> one = readAttribute(
+          engine.output.bytes(),
+          must(engine.system->scene().output(instance)).places[Stream::positions], vertexCount);
       bytes.insert(bytes.end(), one.begin(), one.end());
     }
     return bytes;

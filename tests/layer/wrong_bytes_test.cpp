@@ -66,7 +66,7 @@ class WrongBytesTest : public ::testing::Test {
     for (const std::vector<JointMatrix>& pose : poses_)
       expected_.push_back(*reference::skin(mesh_.view(), pose, Method::dualQuaternion));
     output_.layout.tangents = VertexFormat::float32x4;
-    output_.layout.motion = Motion::kept;
+    output_.layout.motion = true;
     output_.layout.bounds = true;
     output_.layout.gap = 4;
   }
@@ -129,8 +129,7 @@ class WrongBytesTest : public ::testing::Test {
         request.pose = poses_[0];
       }
       const samples::BatchLayout layout = samples::layOutBatch(requests, output_.layout);
-      const OutputAttribute attribute =
-          samples::attributeOf(layout.jobs[instance], static_cast<std::size_t>(stream));
+      const OutputAttribute& attribute = layout.jobs[instance].places[stream];
       const std::uint64_t place =
           attribute.offset + std::uint64_t{vertex} * attribute.stride + byte;
       ASSERT_LT(place, written.output.size());

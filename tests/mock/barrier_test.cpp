@@ -16,7 +16,6 @@ namespace {
 using vulkan::Barrier;
 using vulkan::barrierBetween;
 using vulkan::QueueTransfer;
-using vulkan::Use;
 
 constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 constexpr VkAccessFlags reads = VK_ACCESS_SHADER_READ_BIT, writes = VK_ACCESS_SHADER_WRITE_BIT;
@@ -44,6 +43,7 @@ constexpr UseByTheEngine uses[] = {
     DERMIS_READER(computeRead, COMPUTE_SHADER_BIT, SHADER_READ_BIT),
     DERMIS_READER(copyRead, TRANSFER_BIT, TRANSFER_READ_BIT),
     DERMIS_READER(hostRead, HOST_BIT, HOST_READ_BIT),
+    DERMIS_READER(indirectRead, DRAW_INDIRECT_BIT, INDIRECT_COMMAND_READ_BIT),
     DERMIS_WRITER(computeWrite, COMPUTE_SHADER_BIT, SHADER_WRITE_BIT),
     DERMIS_WRITER(copyWrite, TRANSFER_BIT, TRANSFER_WRITE_BIT),
     DERMIS_WRITER(hostWrite, HOST_BIT, HOST_WRITE_BIT),

@@ -413,7 +413,7 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   variant.normals = VertexFormat::octahedral8x2;
   variant.tangents = VertexFormat::snorm8x4;
   variant.wide = {true, false, true, true};
-  variant.motion = Motion::kept;
+  variant.motion = true;
   variant.morphs = true;
   variant.bounds = true;
   variant.scales = true;

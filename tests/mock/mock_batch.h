@@ -59,10 +59,10 @@ struct MockBatch {
     return {bufferOf(role), 0, (size + 3) / 4 * 4};
   }
   vulkan::BatchBuffers buffers() const {
-    vulkan::OutputBuffers outputs = vulkan::OutputBuffers::oneBuffer(range(BufferRole::positions));
+    auto outputs = ByStream<vulkan::BufferRange>::all(range(BufferRole::positions));
     if (batch.hasSeparateOutputs) {
-      outputs = {range(BufferRole::positions), range(BufferRole::normals),
-                 range(BufferRole::tangents), range(BufferRole::previousPositions)};
+      outputs = {{range(BufferRole::positions), range(BufferRole::normals),
+                  range(BufferRole::tangents), range(BufferRole::previousPositions)}};
     }
     return {range(BufferRole::meshes),
             range(BufferRole::poses),

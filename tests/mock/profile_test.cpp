@@ -108,8 +108,8 @@ TEST_P(MockProfileTest, DispatchesOfMillionsOfWorkgroupsKeepItsLimits) {
   for (Job& job : batch.jobs) {
     job.mesh.vertexCount = vertices;
     job.mesh.byteSize = (vertices + 4) * 3 * std::uint64_t{16};
-    job.positions.offset = size;
-    job.normals.offset = size + 12;
+    job.places[Stream::positions].offset = size;
+    job.places[Stream::normals].offset = size + 12;
     size += std::uint64_t{vertices} * 24;
   }
   batch.outputSize = size;

@@ -24,7 +24,6 @@ namespace {
 
 using vulkan::BatchBuffers;
 using vulkan::BufferRange;
-using vulkan::OutputBuffers;
 
 struct RecordTest : public MockContextTest {};
 
@@ -32,9 +31,9 @@ struct RecordTest : public MockContextTest {};
 MockBatch richBatch(const DeviceLimits& limits) {
   MockBatch result;
   Job job = result.batch.jobOf(0, 0, Method::dualQuaternion);
-  job.normals.format = VertexFormat::octahedral16x2;
-  job.tangents.format = VertexFormat::snorm8x4;
-  job.motion = Motion::kept;
+  job.places[Stream::normals].format = VertexFormat::octahedral16x2;
+  job.places[Stream::tangents].format = VertexFormat::snorm8x4;
+  job.places[Stream::previousPositions].format = job.places[Stream::positions].format;
   job.bounds = true;
   result.batch.place(job, Arrangement::separate);
   job.method = Method::linear;
@@ -56,14 +55,14 @@ const BoundRole roles[] = {
     {BufferRole::tables, "tables", [](BatchBuffers& b) -> BufferRange& { return b.tables; }},
     {BufferRole::palettes, "palettes", [](BatchBuffers& b) -> BufferRange& { return b.palettes; }},
     {BufferRole::results, "results", [](BatchBuffers& b) -> BufferRange& { return b.results; }},
-    {BufferRole::positions, "outputs.positions",
-     [](BatchBuffers& b) -> BufferRange& { return b.outputs.positions; }},
-    {BufferRole::normals, "outputs.normals",
-     [](BatchBuffers& b) -> BufferRange& { return b.outputs.normals; }},
-    {BufferRole::tangents, "outputs.tangents",
-     [](BatchBuffers& b) -> BufferRange& { return b.outputs.tangents; }},
-    {BufferRole::previousPositions, "outputs.previousPositions",
-     [](BatchBuffers& b) -> BufferRange& { return b.outputs.previousPositions; }}};
+    {BufferRole::positions, "outputs[positions]",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs[Stream::positions]; }},
+    {BufferRole::normals, "outputs[normals]",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs[Stream::normals]; }},
+    {BufferRole::tangents, "outputs[tangents]",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs[Stream::tangents]; }},
+    {BufferRole::previousPositions, "outputs[previousPositions]",
+     [](BatchBuffers& b) -> BufferRange& { return b.outputs[Stream::previousPositions]; }}};
 
 TEST_F(RecordTest, RangesThatCannotBeBoundAreRefused) {
   ASSERT_NO_FATAL_FAILURE(create());
@@ -110,22 +109,21 @@ TEST_F(RecordTest, WithFourStorageBuffersAllAttributesGoToOne) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = MockBatch::withAllMethods(context->limits());
   EXPECT_TRUE(record(batch).ok());
-  for (BufferRange OutputBuffers::*member :
-       {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
+  for (const Stream stream : {Stream::normals, Stream::tangents, Stream::previousPositions}) {
     BatchBuffers buffers = batch.buffers();
     const auto expectOtherRefused = [&] {
       expectRefused(batch, buffers, ErrorCode::limitExceeded, "4 storage buffers per stage");
       buffers = batch.buffers();
     };
-    (buffers.outputs.*member).buffer = bufferOf(BufferRole::results);
+    buffers.outputs[stream].buffer = bufferOf(BufferRole::results);
     expectOtherRefused();
-    (buffers.outputs.*member).offset = 256;
+    buffers.outputs[stream].offset = 256;
     expectOtherRefused();
-    (buffers.outputs.*member).size += 4;
+    buffers.outputs[stream].size += 4;
     expectOtherRefused();
     // Not wanted, not given.
-    if (member != &OutputBuffers::normals) {
-      buffers.outputs.*member = {};
+    if (stream != Stream::normals) {
+      buffers.outputs[stream] = {};
       EXPECT_TRUE(record(batch, buffers).ok());
     }
   }
@@ -135,9 +133,9 @@ TEST_F(RecordTest, BuffersThatThePlanUsesMustBeLargeEnough) {
   ASSERT_NO_FATAL_FAILURE(create());
   const MockBatch batch = richBatch(context->limits());
   for (const auto& [role, name, rangeOf] : roles) {
-    const std::string prefix = "outputs.";
+    const std::string prefix = "outputs[";
     std::string text = name;
-    if (text.find(prefix) == 0) text.erase(0, prefix.size());
+    if (text.find(prefix) == 0) text = text.substr(prefix.size(), text.size() - prefix.size() - 1);
     if (text == "previousPositions") text = "previous positions";
     const std::string needed = std::to_string(batch.plan.buffer(role).size);
     BatchBuffers buffers = batch.buffers();
@@ -156,11 +154,10 @@ TEST_F(RecordTest, WhatThePlanDoesNotUseMayBeMissing) {
   BatchBuffers buffers = batch.buffers();
   EXPECT_EQ(buffers.palettes.buffer, VkBuffer{VK_NULL_HANDLE});
   EXPECT_EQ(buffers.results.buffer, VkBuffer{VK_NULL_HANDLE});
-  for (BufferRange OutputBuffers::*member :
-       {&OutputBuffers::normals, &OutputBuffers::tangents, &OutputBuffers::previousPositions}) {
-    buffers.outputs.*member = {bufferOf(BufferRole::normals), 0, 4};
+  for (const Stream stream : {Stream::normals, Stream::tangents, Stream::previousPositions}) {
+    buffers.outputs[stream] = {bufferOf(BufferRole::normals), 0, 4};
     EXPECT_TRUE(record(batch, buffers).ok()) << "too small for a plan that used it";
-    buffers.outputs.*member = {};
+    buffers.outputs[stream] = {};
   }
   EXPECT_TRUE(record(batch, buffers).ok());
 }
@@ -242,8 +239,8 @@ MockBatch wideBatch(const DeviceLimits& limits, bool near) {
   result.batch.outputSize = 300000;
   for (std::uint64_t place = 0; place < 280000; place += 20000) {
     Job job = result.batch.jobOf(0, 0, Method::linear);
-    job.positions = {place, 24, VertexFormat::float32x3};
-    job.normals = {near ? place + 12 : 290000 - place, 24, VertexFormat::float32x3};
+    job.places[Stream::positions] = {place, 24, VertexFormat::float32x3};
+    job.places[Stream::normals] = {near ? place + 12 : 290000 - place, 24, VertexFormat::float32x3};
     result.batch.jobs.push_back(job);
   }
   result.makePlan(limits);
@@ -258,8 +255,8 @@ TEST_F(RecordTest, WindowsOfOutputsAreBoundWhereTheyBegin) {
       ASSERT_NO_FATAL_FAILURE(create(push));
       const MockBatch batch = wideBatch(context->limits(), true);
       BatchBuffers buffers = batch.buffers();
-      buffers.outputs.positions.offset = 4096;
-      buffers.outputs = OutputBuffers::oneBuffer(buffers.outputs.positions);
+      buffers.outputs[Stream::positions].offset = 4096;
+      buffers.outputs.fill(buffers.outputs[Stream::positions]);
       ASSERT_TRUE(record(batch, buffers).ok());
       ASSERT_EQ(mock.dispatches.size(), dispatchesOf(batch.plan).size());
       ASSERT_GT(mock.dispatches.size(), 4u);
@@ -304,8 +301,8 @@ TEST_F(RecordTest, BuffersWithinARangeHaveNoWindows) {
     batch.batch.separateSizes = {300000, 40000, 0, 0};
     for (std::uint64_t instance = 0; instance < 5; ++instance) {
       Job job = batch.batch.jobOf(0, 0, Method::linear);
-      job.positions = {instance * 60000, 24, VertexFormat::float32x3};
-      job.normals = {instance * 400, 4, VertexFormat::octahedral16x2};
+      job.places[Stream::positions] = {instance * 60000, 24, VertexFormat::float32x3};
+      job.places[Stream::normals] = {instance * 400, 4, VertexFormat::octahedral16x2};
       batch.batch.jobs.push_back(job);
     }
     batch.makePlan(context->limits());
@@ -392,8 +389,8 @@ struct KnownLayouts {
       if (layouts.size() < 3) layouts.push_back(job);
     }
     Job pairs;  // stored two words at a time
-    pairs.positions = {0, 24, VertexFormat::float32x3};
-    pairs.normals = {12, 24, VertexFormat::float32x3};
+    pairs.places[Stream::positions] = {0, 24, VertexFormat::float32x3};
+    pairs.places[Stream::normals] = {12, 24, VertexFormat::float32x3};
     layouts.push_back(pairs);
   }
 
@@ -411,16 +408,8 @@ struct KnownLayouts {
     for (std::uint32_t count = below(30); count > 0; --count) {
       const Job& layout = layouts[below(static_cast<std::uint32_t>(layouts.size()))];
       Job job = owned.jobOf(below(4), below(4), layout.method);
-      const auto attribute = [&](OutputAttribute from) {
-        if (from.format == VertexFormat::none && from.stride == 0) return from;
-        from.offset += owned.outputSize;
-        return from;
-      };
-      job.positions = attribute(layout.positions);
-      job.normals = attribute(layout.normals);
-      job.tangents = attribute(layout.tangents);
-      job.previousPositions = attribute(layout.previousPositions);
-      job.motion = layout.motion;
+      job.places = layout.places;
+      for (OutputAttribute& attribute : job.places.attributes) attribute.offset += owned.outputSize;
       job.bounds = layout.bounds;
       job.box = {{0, 0, 0}, {1, 1, 1}};
       if (below(2) == 0) job.morphs = owned.keep({{below(3), static_cast<float>(below(2))}});
@@ -472,7 +461,7 @@ TEST_F(RecordTest, DispatchesAreThoseOfThePlan) {
   ASSERT_NO_FATAL_FAILURE(create());
   MockBatch batch = richBatch(context->limits());
   Job other = batch.batch.jobOf(0, 0, Method::linear);
-  other.positions.format = VertexFormat::float16x4;
+  other.places[Stream::positions].format = VertexFormat::float16x4;
   batch.batch.place(other, Arrangement::separate);
   batch.makePlan(context->limits());
   ASSERT_TRUE(record(batch).ok());

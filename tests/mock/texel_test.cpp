@@ -172,9 +172,9 @@ TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
     mockBatch.batch.addJob(0, 0, Method::dualQuaternion, true);
     Job job = mockBatch.batch.jobs[0];
     Batch batch = mockBatch.batch.batch();
-    batch.outputs = OutputSizes::oneBuffer(1 << 20);
-    job.positions = {64, 32, VertexFormat::float32x3};
-    job.normals = {76, 32, VertexFormat::float32x3};
+    batch.outputSizes.fill(1 << 20);
+    job.places[Stream::positions] = {64, 32, VertexFormat::float32x3};
+    job.places[Stream::normals] = {76, 32, VertexFormat::float32x3};
     DeviceLimits changed = limits;
     change(job, batch, changed);
     batch.jobs = {&job, 1};
@@ -189,11 +189,14 @@ TEST_F(MockTexelTest, PairsAreStoredWhereAllThatTheyNeedIsThere) {
   EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.method = Method::logMatrix; }));
   EXPECT_FALSE(pairs([](Job&, Batch&, DeviceLimits& device) { device.texelBuffers = false; }));
   EXPECT_TRUE(pairs([](Job& job, Batch&, DeviceLimits&) { job.bounds = true; }));
-  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.offset += 4; }));
-  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals.stride += 8; }));
-  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.normals = {}; }));
-  EXPECT_FALSE(pairs(
-      [](Job& job, Batch&, DeviceLimits&) { job.positions.stride = job.normals.stride = 36; }));
+  EXPECT_FALSE(
+      pairs([](Job& job, Batch&, DeviceLimits&) { job.places[Stream::normals].offset += 4; }));
+  EXPECT_FALSE(
+      pairs([](Job& job, Batch&, DeviceLimits&) { job.places[Stream::normals].stride += 8; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) { job.places[Stream::normals] = {}; }));
+  EXPECT_FALSE(pairs([](Job& job, Batch&, DeviceLimits&) {
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 36;
+  }));
 }
 
 // An attribute, or all of a vertex, by one store.
@@ -206,7 +209,7 @@ TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirS
   const Job plain = mockBatch.batch.jobs[0];
   const auto variantOf = [&](const VertexLayout& layout, std::uint64_t offset = 0) {
     Job job = plain;
-    job.place(*placeVertices(layout, 7, offset));
+    job.places = *placeVertices(layout, 7, offset);
     return everyVariant(job, limits, {})->back();
   };
   const auto record = [&](VertexFormat positions, VertexFormat normals,
@@ -228,14 +231,13 @@ TEST_F(MockTexelTest, AttributesAreStoredAtOnceWhereTheyStandAtMultiplesOfTheirS
   EXPECT_TRUE(variantOf({.positions = float32x3}).wide[0]);
   EXPECT_FALSE(variantOf({.positions = float32x3, .stride = 16}).wide[0]);
   // Previous positions, and attributes of the engine's, are no part of the record.
-  const Variant kept = variantOf({.normals = float32x3, .motion = Motion::kept});
+  const Variant kept = variantOf({.normals = float32x3, .motion = true});
   EXPECT_EQ(kept.recordBytes, 0);  // at multiples of 36 bytes
   EXPECT_EQ(kept.wide, (std::array{true, true, false, true}));
   EXPECT_EQ(variantOf({.normals = float32x3, .stride = 48}).recordBytes, 24);
   const Variant between = variantOf({.normals = float32x3, .stride = 32});
   EXPECT_TRUE(between.recordBytes == 0 && between.pairs);
-  const Variant planar =
-      variantOf({.normals = float16x4, .arrangement = dermis::Arrangement::planar}, 48);
+  const Variant planar = variantOf({.normals = float16x4, .planar = true}, 48);
   EXPECT_EQ(planar.recordBytes, 0);
   EXPECT_EQ(planar.wide, (std::array{true, true, false, false}));
 }
@@ -245,13 +247,15 @@ TEST_F(MockTexelTest, APlanWithSharedWordsNeedsOneOutputBuffer) {
   MockBatch batch;
   batch.batch.addMesh(meshOf(10, 2, 4, MeshParts{true, true, 0}));
   Job job = batch.batch.jobOf(1, 0, Method::dualQuaternion);
-  job.normals.format = job.tangents.format = VertexFormat::octahedral8x2;
+  job.places[Stream::normals].format = job.places[Stream::tangents].format =
+      VertexFormat::octahedral8x2;
   batch.batch.place(job, Arrangement::interleaved);
   batch.makePlan(context->limits());
   vulkan::BatchBuffers buffers = batch.buffers();
   EXPECT_TRUE(record(batch, buffers).ok());
-  for (const auto& [range, role] : {std::pair{&buffers.outputs.normals, BufferRole::normals},
-                                    {&buffers.outputs.tangents, BufferRole::tangents}}) {
+  for (const auto& [range, role] :
+       {std::pair{&buffers.outputs[Stream::normals], BufferRole::normals},
+        {&buffers.outputs[Stream::tangents], BufferRole::tangents}}) {
     const vulkan::BufferRange good = *range;
     range->buffer = bufferOf(role);
     expectRefused(batch, buffers, ErrorCode::invalidArgument, "one buffer");
@@ -264,16 +268,16 @@ TEST_F(MockTexelTest, APlanThatStoresPairsNeedsOneOutputBuffer) {
   MockBatch batch;
   batch.batch.addJob(0, 0, Method::dualQuaternion, true);
   Job job = batch.batch.jobs[0];
-  job.positions = {0, 32, VertexFormat::float32x3};
-  job.normals = {12, 32, VertexFormat::float32x3};
+  job.places[Stream::positions] = {0, 32, VertexFormat::float32x3};
+  job.places[Stream::normals] = {12, 32, VertexFormat::float32x3};
   Batch described = batch.batch.batch();
   described.jobs = {&job, 1};
-  described.outputs = OutputSizes::oneBuffer(100 * 32);
+  described.outputSizes.fill(100 * 32);
   ASSERT_TRUE(makePlan(described, context->limits(), {}, batch.plan).ok());
   ASSERT_TRUE(variantsOf(batch.plan.pipelines()).back().pairs);
   vulkan::BatchBuffers buffers = batch.buffers();
   EXPECT_TRUE(record(batch, buffers).ok());
-  buffers.outputs.normals.buffer = bufferOf(BufferRole::normals);
+  buffers.outputs[Stream::normals].buffer = bufferOf(BufferRole::normals);
   expectRefused(batch, buffers, ErrorCode::invalidArgument, "one buffer");
 }
 

@@ -14,7 +14,7 @@ std::vector<std::byte> skinOne(const PackedMesh& mesh, Method method, const Vert
   job.method = method;
   job.places = must(placeVertices(layout, mesh.vertexCount()));
   std::vector<std::byte> bytes(job.places.size);
-  instance.output = bytes.data();
+  instance.output.fill(bytes.data());
   job.instances = {&instance, 1};
   must(cpu::skin(job));
   return bytes;

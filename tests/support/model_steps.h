@@ -44,7 +44,7 @@ inline constexpr std::array<Box, 2> boxes{
 inline std::array<VertexLayout, 4> someLayouts() {
   std::array<VertexLayout, 4> layouts{plainLayout(), motionLayout(), motionLayout(),
                                       motionLayout()};
-  layouts[2].arrangement = Arrangement::planar;
+  layouts[2].planar = true;
   layouts[2].tangents = VertexFormat::octahedral16x2;
   layouts[3].positions = VertexFormat::snorm16x4;
   return layouts;
@@ -155,11 +155,11 @@ class ModelSteps {
   void addPose() {
     if (model_->poses.size() >= 30) return;
     const std::uint32_t pose = below(poseCount);
-    const PoseWriter writer = hasGpu && chance(40) ? PoseWriter::gpu : PoseWriter::cpu;
+    const bool writtenByGpu = hasGpu && chance(40) ? true : false;
     if (chance(30))
-      tryToAdd([&] { return system().addPose(8, {.writer = writer}); },
+      tryToAdd([&] { return system().addPose(8, {.writtenByGpu = writtenByGpu}); },
                [&](PoseHandle added) { must(system().removePose(added)); });
-    const Result<PoseHandle> added = system().addPose(8, {.writer = writer});
+    const Result<PoseHandle> added = system().addPose(8, {.writtenByGpu = writtenByGpu});
     if (!added) {  // places of palettes that went are not free yet
       messages_.insert(added.error().message);
       return;
@@ -380,7 +380,7 @@ class ModelSteps {
     for (const ModelInstance& instance : model_->instances) {
       const InstanceOutput output = must(system().output(instance.handle));
       scene.numbers.insert(scene.numbers.end(),
-                           {output.offset, output.size, output.mesh.index, output.isWritten,
+                           {output.offset, output.places.size, output.mesh.index, output.isWritten,
                             std::uint64_t{must(system().isDue(instance.handle))}});
     }
     return scene;
@@ -531,7 +531,7 @@ class ModelSteps {
       for (std::size_t stream = 0; stream < previousStream; ++stream)
         EXPECT_TRUE(streams[stream] == wanted[stream]) << "stream " << stream;
       ++checkedInstances_;
-      if (instance.description.layout.motion == Motion::none || !instance.before) continue;
+      if (!instance.description.layout.motion || !instance.before) continue;
       EXPECT_TRUE(streams[previousStream] == expected(instance, *instance.before)[positionStream])
           << "previous positions";
     }

@@ -118,17 +118,16 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
                      true});
   };
   drawOther({.stride = 200});
-  drawOther({.arrangement = Arrangement::planar});
+  drawOther({.planar = true});
 
-  const auto addPose = [&](std::uint32_t joints, PoseWriter writer) {
-    calls.push_back({[&system, joints, writer] {
-      return withoutValue(system.addPose(joints, {.writer = writer}));
+  const auto addPose = [&](std::uint32_t joints, bool writtenByGpu) {
+    calls.push_back({[&system, joints, writtenByGpu] {
+      return withoutValue(system.addPose(joints, {.writtenByGpu = writtenByGpu}));
     }});
   };
-  addPose(0, PoseWriter::cpu);
-  addPose(maxPoseJoints + 1, PoseWriter::cpu);
-  addPose(maxPoseJoints, PoseWriter::cpu);  // more than the maximum
-  addPose(8, static_cast<PoseWriter>(2));
+  addPose(0, false);
+  addPose(maxPoseJoints + 1, false);
+  addPose(maxPoseJoints, false);  // more than the maximum
   calls.push_back({[&system] {
     std::vector<PoseHandle> poses(100);
     return system.addPoses(poses, 1000);

@@ -24,10 +24,6 @@ std::map<Blob, OwnedMesh>& sources() {
 
 }  // namespace
 
-std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output) {
-  return {output.positions, output.normals, output.tangents, output.previousPositions};
-}
-
 std::vector<std::byte> readAttribute(std::span<const std::byte> bytes,
                                      const OutputAttribute& attribute, std::uint32_t vertexCount) {
   const std::size_t size = formatSize(attribute.format);
@@ -44,7 +40,7 @@ Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& outp
                     std::uint32_t vertexCount) {
   Streams streams;
   for (std::size_t stream = 0; stream < streamCount; ++stream)
-    streams[stream] = readAttribute(bytes, attributesOf(output)[stream], vertexCount);
+    streams[stream] = readAttribute(bytes, output.places.attributes[stream], vertexCount);
   return streams;
 }
 
@@ -71,7 +67,7 @@ VertexLayout plainLayout() {
 
 VertexLayout motionLayout() {
   VertexLayout layout = plainLayout();
-  layout.motion = Motion::kept;
+  layout.motion = true;
   return layout;
 }
 

@@ -30,9 +30,6 @@ inline void must(const Result<void>& result) {
 /// The attributes of an instance as they are stored, tightly packed, by `Stream`.
 using Streams = std::array<std::vector<std::byte>, streamCount>;
 
-/// The attributes of an output, by `Stream`.
-std::array<OutputAttribute, streamCount> attributesOf(const InstanceOutput& output);
-
 /// All attributes of an output with `vertexCount` vertices; empty if there is no output.
 Streams readStreams(std::span<const std::byte> bytes, const InstanceOutput& output,
                     std::uint32_t vertexCount);

@@ -8,7 +8,6 @@
 namespace dermis::test {
 
 using vulkan::barrierBetween;
-using vulkan::Use;
 
 SystemEngine::SystemEngine(samples::Device& device, const vulkan::Context& context,
                            const vulkan::SceneRecorderDescription& description)

@@ -159,18 +159,18 @@ class SystemModel {
             instance.description.method};
   }
   void lock(const InstanceOutput& output) {
-    locked_.push_back({output.offset, output.offset + output.size, engine_.frame()});
+    locked_.push_back({output.offset, output.offset + output.places.size, engine_.frame()});
   }
   void checkPlace(const ModelInstance& instance, const InstanceOutput& output, bool hasPlace) {
     const bool stays = instance.hasPlace && output.offset == instance.output.offset &&
-                       output.size == instance.output.size;
+                       output.places.size == instance.output.places.size;
     const bool hasSameMesh = output.mesh == instance.output.mesh;
     EXPECT_TRUE(stays || mayMove || !instance.hasPlace || !hasSameMesh) << "it moved";
     movedInstances += !stays && instance.hasPlace;
     // Where another stood that a frame under way may still read.
     for (const Place& place : locked_) {
       EXPECT_TRUE(!hasPlace || stays || output.offset >= place.end ||
-                  output.offset + output.size <= place.begin)
+                  output.offset + output.places.size <= place.begin)
           << "a place of a frame under way is used again";
     }
   }
@@ -188,7 +188,7 @@ class SystemModel {
     std::map<std::uint64_t, std::uint64_t> places;
     for (const ModelInstance& instance : instances) {
       if (!instance.hasPlace) continue;
-      EXPECT_TRUE(places.emplace(instance.output.offset, instance.output.size).second);
+      EXPECT_TRUE(places.emplace(instance.output.offset, instance.output.places.size).second);
     }
     std::uint64_t end = 0;
     for (const auto& [offset, size] : places) {
@@ -229,7 +229,7 @@ class SystemModel {
   }
   void updateDisplayed(ModelInstance& instance, bool isPlaced, Lists& lists) {
     const bool comesBack = !instance.wasDisplayed;
-    const bool hasPrevious = instance.description.layout.motion != Motion::none;
+    const bool hasPrevious = instance.description.layout.motion;
     const bool isCulled = instance.description.culledOnGpu;
     const bool isSettled = lists.settled.contains(instance.handle.index);
     lists.gpu.visible += isCulled;

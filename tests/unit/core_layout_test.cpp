@@ -17,7 +17,7 @@ namespace {
 constexpr VertexLayout full{.positions = VertexFormat::float32x3,
                             .normals = VertexFormat::octahedral16x2,
                             .tangents = VertexFormat::snorm8x4,
-                            .motion = Motion::kept};
+                            .motion = true};
 
 void expectPlace(const OutputAttribute& attribute, std::uint64_t offset, std::uint32_t stride,
                  VertexFormat format) {
@@ -29,27 +29,27 @@ void expectPlace(const OutputAttribute& attribute, std::uint64_t offset, std::ui
 TEST(Layout, PlacesAttributesVertexByVertex) {
   const Result<VertexPlaces> places = placeVertices(full, 10, 320);
   ASSERT_TRUE(places.ok());
-  expectPlace(places->positions, 320, 32, VertexFormat::float32x3);
-  expectPlace(places->normals, 332, 32, VertexFormat::octahedral16x2);
-  expectPlace(places->tangents, 336, 32, VertexFormat::snorm8x4);
-  expectPlace(places->previousPositions, 340, 32, VertexFormat::float32x3);
+  expectPlace((*places)[Stream::positions], 320, 32, VertexFormat::float32x3);
+  expectPlace((*places)[Stream::normals], 332, 32, VertexFormat::octahedral16x2);
+  expectPlace((*places)[Stream::tangents], 336, 32, VertexFormat::snorm8x4);
+  expectPlace((*places)[Stream::previousPositions], 340, 32, VertexFormat::float32x3);
   EXPECT_EQ(places->size, 320u);
   EXPECT_EQ(places->alignment, 32u);
   Job job;
-  job.place(*places);
-  EXPECT_EQ(job.motion, Motion::kept);
-  EXPECT_EQ(job.tangents.offset, 336u);
+  job.places = *places;
+  EXPECT_TRUE(job.places.hasMotion());
+  EXPECT_EQ(job.places[Stream::tangents].offset, 336u);
 }
 
 TEST(Layout, PlacesAttributesOneAfterTheOther) {
   VertexLayout layout = full;
-  layout.arrangement = Arrangement::planar;
+  layout.planar = true;
   const Result<VertexPlaces> places = placeVertices(layout, 5, 48);
   ASSERT_TRUE(places.ok());
-  expectPlace(places->positions, 48, 12, VertexFormat::float32x3);  // 60 bytes
-  expectPlace(places->normals, 144, 4, VertexFormat::octahedral16x2);
-  expectPlace(places->tangents, 192, 4, VertexFormat::snorm8x4);
-  expectPlace(places->previousPositions, 240, 12, VertexFormat::float32x3);
+  expectPlace((*places)[Stream::positions], 48, 12, VertexFormat::float32x3);  // 60 bytes
+  expectPlace((*places)[Stream::normals], 144, 4, VertexFormat::octahedral16x2);
+  expectPlace((*places)[Stream::tangents], 192, 4, VertexFormat::snorm8x4);
+  expectPlace((*places)[Stream::previousPositions], 240, 12, VertexFormat::float32x3);
   EXPECT_EQ(places->size, 288u);
 }
 
@@ -65,13 +65,8 @@ TEST(Layout, RefusesWhatCannotStandSo) {
   VertexLayout bad = full;
   bad.stride = 31;
   expectRefused(bad, 0, "stride of 31");
-  bad.arrangement = Arrangement::planar;
+  bad.planar = true;
   expectRefused(bad, 0, "planar");
-  bad.arrangement = static_cast<Arrangement>(2);
-  expectRefused(bad, 0, "arrangement");
-  bad = full;
-  bad.motion = static_cast<Motion>(3);
-  expectRefused(bad, 0, "motion");
   EXPECT_FALSE(pipelines(PipelineNeeds{.layout = bad}, {}, {}).ok());
   bad = {};
   bad.positions = VertexFormat::none;  // nothing at all
@@ -90,16 +85,16 @@ TEST(Layout, NoPipelineStoresRunsThatAreNotWholeWords) {
   using enum VertexFormat;
   VertexLayout layout{.positions = float16x3, .normals = octahedral8x2};
   EXPECT_EQ(refusalOf(layout), "");
-  layout.motion = Motion::kept;
+  layout.motion = true;
   EXPECT_NE(refusalOf(layout).find("the layout: its previous positions as float16x3"),
             std::string::npos);
-  layout.motion = Motion::none;
+  layout.motion = false;
   layout.stride = 10;
   EXPECT_NE(refusalOf(layout).find("stride 10 of its positions"), std::string::npos);
   layout.stride = 0;
-  layout.arrangement = Arrangement::planar;
+  layout.planar = true;
   EXPECT_NE(refusalOf(layout).find("use float16x4"), std::string::npos);
-  EXPECT_EQ(refusalOf({.positions = float16x4, .arrangement = Arrangement::planar}), "");
+  EXPECT_EQ(refusalOf({.positions = float16x4, .planar = true}), "");
   EXPECT_NE(refusalOf({.normals = octahedral8x2}).find("use octahedral16x2"), std::string::npos);
   EXPECT_EQ(refusalOf({.normals = octahedral8x2, .tangents = octahedral8x2}), "");
 }
@@ -122,21 +117,22 @@ TEST(Layout, ForeseesThePipelinesOfEveryPlace) {
         for (const std::uint64_t outputOffset : {0u, 96u, 768u}) {
           PipelineNeeds needs{
               .layout = {.positions = positions, .normals = normals, .stride = stride}};
-          if (stride == 1) needs.layout = {.normals = normals, .arrangement = Arrangement::planar};
+          if (stride == 1) needs.layout = {.normals = normals, .planar = true};
           const std::vector<Variant> foreseen = *everyVariant(needs, limits, {});
           const std::uint64_t alignment = placeVertices(needs.layout, 1)->alignment;
           const std::uint64_t first = (outputOffset + alignment - 1) / alignment;
           for (std::uint64_t place = first; place < first + 9; ++place) {
             Job job;
             job.method = needs.method;
-            job.place(*placeVertices(needs.layout, 7, place * alignment));
-            for (OutputAttribute* attribute : {&job.positions, &job.normals})
-              attribute->offset -= attribute->format != VertexFormat::none ? outputOffset : 0;
+            job.places = *placeVertices(needs.layout, 7, place * alignment);
+            for (OutputAttribute& attribute : job.places.attributes)
+              attribute.offset -= attribute.format != VertexFormat::none ? outputOffset : 0;
             job.mesh.byteSize = 512;
             job.mesh.vertexCount = 7;
             job.mesh.hasNormals = true;
             const PoseDescription pose{1};
-            const Batch batch{{&pose, 1}, {&job, 1}, 512, 48, OutputSizes::oneBuffer(1 << 16)};
+            const Batch batch{
+                {&pose, 1}, {&job, 1}, 512, 48, ByStream<std::uint64_t>::all(1 << 16)};
             Plan plan;
             ASSERT_TRUE(makePlan(batch, limits, {}, plan).ok());
             for (const Variant& variant : variantsOf(plan.pipelines())) {

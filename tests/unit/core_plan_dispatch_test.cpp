@@ -189,8 +189,8 @@ TEST_F(PlanFeatures, JobsOfDifferentFormatsGoToDifferentDispatches) {
     for (const VertexFormat normals : {VertexFormat::octahedral16x2, VertexFormat::snorm8x4}) {
       for (int twice = 0; twice < 2; ++twice) {
         Job job = linear();
-        job.positions.format = format;
-        job.normals.format = normals;
+        job.places[Stream::positions].format = format;
+        job.places[Stream::normals].format = normals;
         add(job);
       }
     }
@@ -204,7 +204,7 @@ TEST_F(PlanFeatures, JobsOfDifferentStoresGoToDifferentDispatches) {
   limits.texelBuffers = true;
   for (const std::uint32_t gap : {0u, 4u, 0u, 12u}) {
     Job job = linear();
-    job.normals.format = VertexFormat::float16x4;
+    job.places[Stream::normals].format = VertexFormat::float16x4;
     batch.place(job, Arrangement::separate, gap);
   }
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, limits, {}, out));
@@ -247,7 +247,7 @@ TEST_F(PlanFeatures, InstancesThatRestartOrSettleShareADispatchWithTheOthers) {
   for (const bool restarts : {false, true}) {
     for (const bool settles : {false, true}) {
       Job job = linear();
-      job.motion = Motion::kept;
+      job.places[Stream::previousPositions].format = job.places[Stream::positions].format;
       job.restartsMotion = restarts;
       job.settles = settles;
       add(job);
@@ -279,7 +279,7 @@ TEST_F(PlanFeatures, ResultsOfLinearJobsAloneAreCleared) {
 TEST_F(PlanFeatures, ResultsStandInTheOrderOfTheirJobsWithoutGaps) {
   Job plain = linear(), bounded = linear(), snorm = linear();
   bounded.bounds = true;
-  snorm.positions.format = VertexFormat::snorm16x4;
+  snorm.places[Stream::positions].format = VertexFormat::snorm16x4;
   snorm.box = {{0, 0, 0}, {1, 1, 1}};
   for (const Job& job : {plain, snorm, bounded, plain, bounded, snorm}) add(job);
   ASSERT_NO_FATAL_FAILURE(expectPlanned(batch, richLimits(), {}, out));
@@ -370,7 +370,7 @@ TEST(Plan, InstancesWithDifferentBoxesAreNotCountedUp) {
     OwnedBatch batch = batchOfFiveMeshes();
     for (std::uint32_t number = 0; number < 5; ++number) {
       Job job = batch.jobOf(0, 0, Method::dualQuaternion);
-      job.positions.format = VertexFormat::snorm16x4;
+      job.places[Stream::positions].format = VertexFormat::snorm16x4;
       job.box = {{-1, -1, -1}, {1, number == 3 ? size : 1, 1}};
       batch.place(job, Arrangement::interleaved);
     }

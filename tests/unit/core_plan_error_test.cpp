@@ -95,11 +95,11 @@ TEST_F(PlanErrors, NormalsBehindPositionsInAnotherBuffer) {
   batch.jobs.clear();
   batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 0, false}));
   Job& only = batch.addJob(2, 1, Method::dualQuaternion, true);
-  only.tangents = {0, 16, VertexFormat::float32x4};
+  only.places[Stream::tangents] = {0, 16, VertexFormat::float32x4};
   batch.hasSeparateOutputs = true;
-  batch.separateSizes = {1000 + batch.outputSize, 1000 + batch.outputSize, 160, 0};
-  expectInvalid({"job 0", "isOneBuffer"});
-  only.normals.offset += 4;
+  batch.separateSizes = {{1000 + batch.outputSize, 1000 + batch.outputSize, 160, 0}};
+  expectInvalid({"job 0", "isOneOutput"});
+  only.places[Stream::normals].offset += 4;
   expectGood();
 }
 
@@ -109,14 +109,14 @@ TEST_F(PlanErrors, PairsOfPositionsAndNormals) {
     limits.texelBuffers = texels;
     batch.outputSize += 24;
     const Job whole = job();
-    job().positions.offset += 4;
-    job().normals.offset += 4;
+    job().places[Stream::positions].offset += 4;
+    job().places[Stream::normals].offset += 4;
     expectInvalid({"job 1", "multiple of 8"});
-    job().normals.offset += 4;
+    job().places[Stream::normals].offset += 4;
     expectGood();
     job() = whole;
     batch.hasSeparateOutputs = true;
-    batch.separateSizes = {batch.outputSize, batch.outputSize, 0, 0};
+    batch.separateSizes = {{batch.outputSize, batch.outputSize, 0, 0}};
     expectInvalid({"job 0", "one buffer"});
     batch.hasSeparateOutputs = false;
     expectGood();
@@ -193,13 +193,13 @@ TEST_F(PlanErrors, NormalsOfAMeshWithoutAny) {
   job().mesh = batch.meshes[1].info();
   job().meshOffset = batch.meshOffsets[1];
   expectInvalid({"job 1", "normals"});
-  job().normals = {};
+  job().places[Stream::normals] = {};
   expectGood();
 }
 
 TEST_F(PlanErrors, TangentsOfAMeshWithoutAny) {
-  job().normals = {};
-  job().tangents = {0, 16, VertexFormat::float32x4};
+  job().places[Stream::normals] = {};
+  job().places[Stream::tangents] = {0, 16, VertexFormat::float32x4};
   expectGood();
   job().mesh = batch.meshes[1].info();
   job().meshOffset = batch.meshOffsets[1];
@@ -207,10 +207,10 @@ TEST_F(PlanErrors, TangentsOfAMeshWithoutAny) {
 }
 
 TEST_F(PlanErrors, OutputAttributes) {
-  for (OutputAttribute Job::*member : {&Job::positions, &Job::normals}) {
-    const char* name = member == &Job::positions ? "positions" : "normals";
-    const OutputAttribute good = job().*member;
-    OutputAttribute& attribute = job().*member;
+  for (const Stream member : {Stream::positions, Stream::normals}) {
+    const char* name = member == Stream::positions ? "positions" : "normals";
+    const OutputAttribute good = job().places[member];
+    OutputAttribute& attribute = job().places[member];
     for (const std::uint32_t stride : {0u, 4u, 8u, 11u}) {
       attribute.stride = stride;
       expectInvalid({"job 1", name, "stride"});
@@ -236,9 +236,9 @@ TEST_F(PlanErrors, OutputAttributes) {
 TEST_F(PlanErrors, OutputsOfDifferentSizes) {
   batch.jobs.clear();
   Job job = batch.jobOf(0, 0, Method::linear);
-  job.normals.format = VertexFormat::float32x3;
-  job.tangents.format = VertexFormat::float16x4;
-  job.motion = Motion::kept;
+  job.places[Stream::normals].format = VertexFormat::float32x3;
+  job.places[Stream::tangents].format = VertexFormat::float16x4;
+  job.places[Stream::previousPositions].format = job.places[Stream::positions].format;
   for (int instance = 0; instance < 2; ++instance) batch.place(job, Arrangement::separate);
   const char* names[] = {"positions", "normals", "tangents", "previous positions"};
   const std::uint64_t sizes[] = {240, 240, 160, 240};
@@ -275,12 +275,12 @@ TEST_F(PlanErrors, FormatsThatAnAttributeMayNotHave) {
   for (const Allowed& allowed : table) {
     SCOPED_TRACE(static_cast<int>(allowed.format));
     for (const auto& [member, isAllowed, name] :
-         {std::tuple{&Job::positions, allowed.positions, "positions"},
-          {&Job::normals, allowed.normals, "normals"},
-          {&Job::tangents, allowed.tangents, "tangents"}}) {
+         {std::tuple{Stream::positions, allowed.positions, "positions"},
+          {Stream::normals, allowed.normals, "normals"},
+          {Stream::tangents, allowed.tangents, "tangents"}}) {
       job() = good;
       job().box = {{0, 0, 0}, {1, 1, 1}};
-      job().*member = {0, 24, allowed.format};
+      job().places[member] = {0, 24, allowed.format};
       const auto number = static_cast<std::size_t>(allowed.format);
       const std::string format = number <= allVertexFormats.size()
                                      ? std::string(formatName(allowed.format))
@@ -291,12 +291,16 @@ TEST_F(PlanErrors, FormatsThatAnAttributeMayNotHave) {
   }
 }
 
-// The format of previous positions is that of the positions.
-TEST_F(PlanErrors, TheFormatOfPreviousPositionsIsNotLookedAt) {
-  job().motion = Motion::kept;
-  job().previousPositions = {0, 24, VertexFormat::octahedral8x2};
-  expectGood();
-  job().previousPositions = {0, 11, VertexFormat::octahedral8x2};
+TEST_F(PlanErrors, PreviousPositionsHaveTheFormatOfPositions) {
+  OutputAttribute& previous = job().places[Stream::previousPositions];
+  for (const VertexFormat format : allVertexFormats) {
+    previous = {0, 24, format};
+    expectGoodOnlyIf(format == job().places[Stream::positions].format, ErrorCode::invalidArgument,
+                     {"job 1", "previous positions", "float32x3"});
+  }
+  previous = {0, 24, static_cast<VertexFormat>(11)};
+  expectInvalid({"job 1", "previous positions", "11", "VertexFormat"});
+  previous = {0, 11, VertexFormat::float32x3};
   expectInvalid({"job 1", "previous positions", "size 12"});
 }
 
@@ -311,9 +315,9 @@ struct Part {
 struct RunErrors : public PlanErrors {
   /// Vertices of `stride` bytes, the first at byte 8.
   void place(std::uint32_t stride, Part positions, Part normals = {}, Part tangents = {}) {
-    job().positions = {8 + positions.place, stride, positions.format};
-    job().normals = {8 + normals.place, stride, normals.format};
-    job().tangents = {8 + tangents.place, stride, tangents.format};
+    job().places[Stream::positions] = {8 + positions.place, stride, positions.format};
+    job().places[Stream::normals] = {8 + normals.place, stride, normals.format};
+    job().places[Stream::tangents] = {8 + tangents.place, stride, tangents.format};
     job().box = {{0, 0, 0}, {1, 1, 1}};
   }
   /// On every device.
@@ -351,8 +355,8 @@ TEST_F(RunErrors, RunsOfWholeWordsAreGood) {
     }
     // The directions of a vertex in an array of their own.
     place(12, {0, float32x3});
-    job().normals = {200, 4, octahedral8x2};
-    job().tangents = {202, 4, octahedral8x2};
+    job().places[Stream::normals] = {200, 4, octahedral8x2};
+    job().places[Stream::tangents] = {202, 4, octahedral8x2};
     expectGood();
     // Only the first run has the gap.
     place(24, {0, float16x3}, {6, octahedral8x2}, {12, octahedral16x2});
@@ -367,7 +371,7 @@ TEST_F(RunErrors, RunsOfOtherLengths) {
       {"job 1: its positions as float16x3 are in a run of 6 bytes, which is not a "
        "multiple of 4; use float16x4"});
   place(8, {0, float16x3}, {8, octahedral16x2});
-  job().normals.stride = 12;
+  job().places[Stream::normals].stride = 12;
   expectRefusedRun({"positions as float16x3", "6 bytes"});
   place(16, {0, float32x3}, {12, octahedral8x2});
   expectRefusedRun({"normals as octahedral8x2", "14 bytes", "use octahedral16x2"});
@@ -386,22 +390,20 @@ TEST_F(RunErrors, RunsOfOtherLengths) {
   expectRefusedRun({"normals as octahedral8x2", "14 bytes"});
   // The same, since strides differ.
   place(8, {0, snorm16x3}, {6, octahedral8x2});
-  job().normals.stride = 12;
+  job().places[Stream::normals].stride = 12;
   limits.maxStorageBuffersPerStage = 8;
   expectInvalid({"positions as snorm16x3", "6 bytes", "use snorm16x4"});
   // Previous positions are never part of another run.
   place(16, {0, float16x3}, {6, octahedral8x2});
-  job().motion = Motion::kept;
   for (const std::uint64_t offset : {16u, 400u}) {
-    job().previousPositions = {offset, 16};
+    job().places[Stream::previousPositions] = {offset, 16, float16x3};
     expectRefusedRun({"previous positions as float16x3", "6 bytes", "use float16x4"});
   }
 }
 
 TEST_F(RunErrors, RunsThatDoNotBeginAtWords) {
   place(32, {0, float32x3}, {12, octahedral8x2}, {14, octahedral8x2});
-  job().motion = Motion::kept;
-  job().previousPositions = {400, 12};
+  job().places[Stream::previousPositions] = {400, 12, float32x3};
   expectGood();
   const auto expectNamed = [&](OutputAttribute& attribute, const char* name) {
     const Job good = job();
@@ -414,12 +416,13 @@ TEST_F(RunErrors, RunsThatDoNotBeginAtWords) {
       job() = good;
     }
   };
-  expectNamed(job().previousPositions, "previous positions");
+  expectNamed(job().places[Stream::previousPositions], "previous positions");
   place(32, {0, float32x3}, {12, octahedral16x2}, {20, octahedral16x2});
-  expectNamed(job().positions, "positions");
-  expectNamed(job().normals, "normals");
-  expectNamed(job().tangents, "tangents");
+  expectNamed(job().places[Stream::positions], "positions");
+  expectNamed(job().places[Stream::normals], "normals");
+  expectNamed(job().places[Stream::tangents], "tangents");
   // A vertex of the whole run.
+  job().places[Stream::previousPositions] = {};
   place(18, {0, float16x3}, {6, octahedral8x2});
   expectRefusedRun({"stride 18"});
 }
@@ -429,17 +432,17 @@ TEST_F(RunErrors, RunsWithSharedWordsInTwoBuffers) {
   batch.jobs.erase(batch.jobs.begin() + 2);
   batch.jobs.erase(batch.jobs.begin());
   Job& only = batch.jobs[0];
-  only.positions = {0, 12, float32x3};
-  only.normals = {0, 8, octahedral16x2};
-  only.tangents = {4, 8, octahedral16x2};
+  only.places[Stream::positions] = {0, 12, float32x3};
+  only.places[Stream::normals] = {0, 8, octahedral16x2};
+  only.places[Stream::tangents] = {4, 8, octahedral16x2};
   batch.hasSeparateOutputs = true;
-  batch.separateSizes = {120, 80, 80, 0};
+  batch.separateSizes = {{120, 80, 80, 0}};
   expectGood();
-  only.normals.format = octahedral8x2;
-  only.tangents = {2, 8, octahedral8x2};
-  expectInvalid({"job 0", "isOneBuffer"});
-  only.normals.offset += 120;
-  only.tangents.offset += 120;
+  only.places[Stream::normals].format = octahedral8x2;
+  only.places[Stream::tangents] = {2, 8, octahedral8x2};
+  expectInvalid({"job 0", "isOneOutput"});
+  only.places[Stream::normals].offset += 120;
+  only.places[Stream::tangents].offset += 120;
   batch.hasSeparateOutputs = false;
   batch.outputSize = 200;
   expectGood();
@@ -457,7 +460,7 @@ TEST_F(PlanErrors, FewStorageBuffersMeanNoResults) {
     job().bounds = true;
     expectGoodOnlyIf(buffers == 8, ErrorCode::limitExceeded, {"job 1", "bounds", count.c_str()});
     job() = good;
-    job().positions = {0, 8, VertexFormat::snorm16x4};
+    job().places[Stream::positions] = {0, 8, VertexFormat::snorm16x4};
     expectGoodOnlyIf(buffers == 8, ErrorCode::limitExceeded, {"job 1", "snorm16", count.c_str()});
     job() = good;
   }
@@ -479,24 +482,23 @@ TEST_F(PlanErrors, MethodsForComparisonMayBeLeftOutOfTheLibrary) {
 TEST_F(PlanErrors, FewStorageBuffersMeanOneWindow) {
   limits.maxStorageBufferRange = 65536;
   batch.outputSize = 10 * 65536;
-  job().tangents = {100, 16, VertexFormat::float32x4};
-  job().motion = Motion::kept;
-  job().previousPositions = {200, 12};
+  job().places[Stream::tangents] = {100, 16, VertexFormat::float32x4};
+  job().places[Stream::previousPositions] = {200, 12, VertexFormat::float32x3};
   for (const std::uint32_t buffers : {4u, 8u}) {
     limits.maxStorageBuffersPerStage = buffers;
     expectGood();
-    for (const auto& [member, name] : {std::pair{&Job::positions, "positions"},
-                                       {&Job::normals, "normals"},
-                                       {&Job::tangents, "tangents"},
-                                       {&Job::previousPositions, "previous positions"}}) {
+    for (const auto& [member, name] : {std::pair{Stream::positions, "positions"},
+                                       {Stream::normals, "normals"},
+                                       {Stream::tangents, "tangents"},
+                                       {Stream::previousPositions, "previous positions"}}) {
       const Job good = job();
-      (job().*member).offset = 9 * 65536;
+      job().places[member].offset = 9 * 65536;
       if (buffers == 8) {
         expectGood();
       } else {
         expectRefused(ErrorCode::limitExceeded, {"job 1", "too far", "4 storage buffers"});
         // What lies far from the positions is named; far positions are far from anything.
-        if (member != &Job::positions) expectRefused(ErrorCode::limitExceeded, {name});
+        if (member != Stream::positions) expectRefused(ErrorCode::limitExceeded, {name});
       }
       job() = good;
     }
@@ -530,18 +532,12 @@ TEST_F(PlanErrors, MorphWeightsThatAreNotFinite) {
   }
 }
 
-TEST_F(PlanErrors, UnknownMotions) {
-  job().motion = static_cast<Motion>(2);
-  expectInvalid({"job 1", "motion"});
-}
-
 TEST_F(PlanErrors, SettlingAndRestartingNeedPreviousPositions) {
   for (bool Job::*flag : {&Job::settles, &Job::restartsMotion}) {
     job().*flag = true;
-    job().motion = Motion::none;
+    job().places[Stream::previousPositions] = {};
     expectInvalid({"job 1", "previous positions"});
-    job().previousPositions = {0, 12};
-    job().motion = Motion::kept;
+    job().places[Stream::previousPositions] = {0, 12, VertexFormat::float32x3};
     expectGood();
     job().*flag = false;
   }
@@ -550,9 +546,10 @@ TEST_F(PlanErrors, SettlingAndRestartingNeedPreviousPositions) {
 TEST_F(PlanErrors, BoxesOfSnormPositions) {
   const Box good{{-1, 0, 5}, {-0.5f, 1e-6f, 1e6f}};
   for (const VertexFormat format : {VertexFormat::snorm16x4, VertexFormat::snorm16x3}) {
-    job().positions = {0, 8, format};
-    job().normals = {};
-    if (format == VertexFormat::snorm16x3) job().normals = {6, 8, VertexFormat::octahedral8x2};
+    job().places[Stream::positions] = {0, 8, format};
+    job().places[Stream::normals] = {};
+    if (format == VertexFormat::snorm16x3)
+      job().places[Stream::normals] = {6, 8, VertexFormat::octahedral8x2};
     job().box = good;
     expectGood();
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -571,7 +568,7 @@ TEST_F(PlanErrors, BoxesOfSnormPositions) {
       job().box = good;
     }
   }
-  job().positions.format = VertexFormat::float16x3;
+  job().places[Stream::positions].format = VertexFormat::float16x3;
   job().box = {{nan, nan, nan}, {0, 0, 0}};
   expectGood();
 }
@@ -625,9 +622,9 @@ TEST_F(PlanErrors, MoreWorkgroupsThanKernelsCount) {
   batch.jobs.resize(1);
   Job& first = batch.jobs[0];
   first.mesh = {.byteSize = batch.meshesSize = (1ull << 29) + 96, .vertexCount = 1u << 25};
-  first.positions.offset = 0;
-  first.positions.stride = 12;
-  first.normals = {};
+  first.places[Stream::positions].offset = 0;
+  first.places[Stream::positions].stride = 12;
+  first.places[Stream::normals] = {};
   const Job large = first;  // 2^22 workgroups
   batch.jobs.assign(512, large);
   expectGood();
@@ -663,7 +660,8 @@ TEST_F(PlanErrors, TablesLargerThanARange) {
   batch.outputSize = 0;
   for (int instance = 0; instance < 2000; ++instance) {
     batch.jobs.push_back(good);
-    batch.jobs.back().positions.offset = batch.jobs.back().normals.offset = 0;
+    batch.jobs.back().places[Stream::positions].offset =
+        batch.jobs.back().places[Stream::normals].offset = 0;
     batch.jobs.back().method = Method::linear;
   }
   batch.outputSize = 240;

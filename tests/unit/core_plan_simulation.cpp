@@ -40,10 +40,9 @@ class Simulation {
   Simulation(const OwnedBatch& batch, const DeviceLimits& limits, const Tuning& tuning,
              const Plan& plan)
       : batch_(batch), limits_(limits), tuning_(tuning), plan_(plan), tables_(tablesOf(plan)) {
-    const OutputSizes outputs = batch.batch().outputs;
-    sizes_ = {outputs.positions, outputs.normals, outputs.tangents, outputs.previousPositions};
+    sizes_ = batch.batch().outputSizes;
     for (std::uint32_t index = 0; index < batch.jobs.size(); ++index) {
-      begins_.push_back({batch.jobs[index].positions.offset, index});
+      begins_.push_back({batch.jobs[index].places[Stream::positions].offset, index});
       written_.emplace_back(batch.jobs[index].mesh.vertexCount, std::uint8_t{0});
       if (wantsResult(batch.jobs[index])) ++resultCount_;
     }
@@ -101,7 +100,7 @@ class Simulation {
     std::uint64_t vertices = 0;
     for (std::size_t index = 0; index < batch_.jobs.size(); ++index) {
       const Job& job = batch_.jobs[index];
-      const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
+      const ByStream<OutputAttribute>& attributes = job.places.attributes;
       std::uint8_t expected = 0;
       for (std::size_t stream = 0; stream < streamCount; ++stream) {
         if (attributes[stream].format == VertexFormat::none) continue;
@@ -337,17 +336,17 @@ class Simulation {
         std::upper_bound(begins_.begin(), begins_.end(), std::pair{place, ~std::uint32_t{0}});
     ASSERT_NE(behind, begins_.begin()) << "a write that no job asked for";
     index = std::prev(behind)->second;
-    const OutputAttribute& positions = batch_.jobs[index].positions;
+    const OutputAttribute& positions = batch_.jobs[index].places[Stream::positions];
     ASSERT_EQ(place, positions.offset + std::uint64_t{firstVertex} * positions.stride);
   }
 
   void checkVariant(const PlannedDispatch& dispatch, const Job& job) {
     const Variant& variant = dispatch.variant;
     ASSERT_EQ(variant.method, job.method);
-    ASSERT_EQ(variant.positions, job.positions.format);
-    ASSERT_EQ(variant.normals, job.normals.format);
-    ASSERT_EQ(variant.tangents, job.tangents.format);
-    ASSERT_EQ(variant.motion, job.motion);
+    ASSERT_EQ(variant.positions, job.places[Stream::positions].format);
+    ASSERT_EQ(variant.normals, job.places[Stream::normals].format);
+    ASSERT_EQ(variant.tangents, job.places[Stream::tangents].format);
+    ASSERT_EQ(variant.motion, job.places.hasMotion());
     ASSERT_EQ(variant.bounds, job.bounds);
     ASSERT_EQ(variant.morphs, isMorphed(job));
     ASSERT_TRUE(variant.influences == 0 || variant.influences >= job.mesh.maxInfluences);
@@ -356,7 +355,7 @@ class Simulation {
     ASSERT_TRUE(variant.scales || !mayScale(job));
     const std::vector<Variant> foreseen = *everyVariant(job, limits_, tuning_);
     ASSERT_NE(std::find(foreseen.begin(), foreseen.end(), variant), foreseen.end());
-    const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
+    const ByStream<OutputAttribute>& attributes = job.places.attributes;
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       const bool isWanted = attributes[stream].format != VertexFormat::none;
       if (variant.wide[stream]) {
@@ -367,7 +366,7 @@ class Simulation {
     // It waits for what it reads or adds to; where there are previous positions, the kernel is one
     // that may see results.
     const bool reads = job.method != Method::linear || wantsResult(job);
-    const bool maySee = reads || job.motion != Motion::none;
+    const bool maySee = reads || job.places.hasMotion();
     const bool anyBefore = !paletteDispatches_.empty() || !cleared_.empty();
     ASSERT_TRUE(dispatch.isAfterBarrier || !(maySee && anyBefore));
     ASSERT_TRUE(anyBefore || !reads);
@@ -414,8 +413,8 @@ class Simulation {
     if (wantsResult(job)) {
       ASSERT_EQ(extension.result * sizeof(InstanceResult), plan_.resultOffset(index));
     }
-    if (job.positions.format != VertexFormat::snorm16x3 &&
-        job.positions.format != VertexFormat::snorm16x4)
+    if (job.places[Stream::positions].format != VertexFormat::snorm16x3 &&
+        job.places[Stream::positions].format != VertexFormat::snorm16x4)
       return;
     const std::array<float, 3> center{extension.centerX, extension.centerY, extension.centerZ};
     const std::array<float, 3> inverse{extension.inverseX, extension.inverseY, extension.inverseZ};
@@ -435,7 +434,7 @@ class Simulation {
   void writeStream(const PlannedDispatch& dispatch, std::uint32_t group, std::uint64_t record,
                    std::uint32_t index, std::size_t stream, const Run& run) {
     const Job& job = batch_.jobs[index];
-    const OutputAttribute attribute = attributesOf(job)[stream];
+    const OutputAttribute attribute = job.places.attributes[stream];
     if (attribute.format == VertexFormat::none) return;
     const std::uint64_t window = dispatch.outputPart(stream).offset;
     ASSERT_LE(window, sizes_[stream]);
@@ -458,7 +457,7 @@ class Simulation {
       // The kernel knows from formats where in a word an attribute begins.
       std::uint32_t before = 0;
       for (std::size_t other = 0; other < stream && stream != previousStream; ++other)
-        before += formatSize(attributesOf(job)[other].format);
+        before += formatSize(job.places.attributes[other].format);
       ASSERT_EQ(place % 4, before % 4);
       if (job.settles && stream != previousStream) continue;  // positions are read
       std::uint8_t& streams = written_[index].at(vertex);
@@ -534,7 +533,7 @@ Job OwnedBatch::jobOf(std::uint32_t mesh, std::uint32_t palette, Method method) 
   job.meshOffset = meshOffsets[mesh];
   job.pose = palette;
   job.method = method;
-  job.positions.format = VertexFormat::float32x3;
+  job.places[Stream::positions].format = VertexFormat::float32x3;
   return job;
 }
 
@@ -542,8 +541,8 @@ Job& OwnedBatch::addJob(std::uint32_t mesh, std::uint32_t palette, Method method
                         std::uint32_t stride) {
   Job job = jobOf(mesh, palette, method);
   if (normals && stride % 8 == 0) outputSize += outputSize % 8;
-  job.positions = {outputSize, stride, VertexFormat::float32x3};
-  if (normals) job.normals = {outputSize + 12, stride, VertexFormat::float32x3};
+  job.places[Stream::positions] = {outputSize, stride, VertexFormat::float32x3};
+  if (normals) job.places[Stream::normals] = {outputSize + 12, stride, VertexFormat::float32x3};
   outputSize += std::uint64_t{job.mesh.vertexCount} * stride;
   jobs.push_back(job);
   return jobs.back();
@@ -551,9 +550,7 @@ Job& OwnedBatch::addJob(std::uint32_t mesh, std::uint32_t palette, Method method
 
 Job& OwnedBatch::place(Job job, Arrangement arrangement, std::uint32_t gap) {
   hasSeparateOutputs = hasSeparateOutputs || arrangement == Arrangement::separate;
-  const std::array<OutputAttribute, streamCount> attributes = attributesOf(job);
-  const std::array<OutputAttribute*, streamCount> places{&job.positions, &job.normals,
-                                                         &job.tangents, &job.previousPositions};
+  ByStream<OutputAttribute>& attributes = job.places.attributes;
   const std::uint64_t vertices = job.mesh.vertexCount;
   std::uint32_t inVertex = 0;
   std::uint32_t vertexSize = gap;
@@ -564,13 +561,13 @@ Job& OwnedBatch::place(Job job, Arrangement arrangement, std::uint32_t gap) {
     const std::uint32_t size = formatSize(attributes[stream].format);
     if (size == 0) continue;
     if (arrangement == Arrangement::interleaved) {
-      places[stream]->offset = outputSize + inVertex;
-      places[stream]->stride = vertexSize;
+      attributes[stream].offset = outputSize + inVertex;
+      attributes[stream].stride = vertexSize;
       inVertex += size;
     } else {
       std::uint64_t& end = endOf(stream);
-      places[stream]->offset = end;
-      places[stream]->stride = size + gap;
+      attributes[stream].offset = end;
+      attributes[stream].stride = size + gap;
       end += vertices * (size + gap);
       end += (4 - end % 4) % 4;
     }
@@ -585,10 +582,12 @@ std::span<const MorphWeight> OwnedBatch::keep(std::vector<MorphWeight> morphs) {
 }
 
 Batch OwnedBatch::batch() const {
-  return {poses, jobs, meshesSize, posesSize,
-          hasSeparateOutputs
-              ? OutputSizes{separateSizes[0], separateSizes[1], separateSizes[2], separateSizes[3]}
-              : OutputSizes::oneBuffer(outputSize)};
+  return {poses,
+          jobs,
+          meshesSize,
+          posesSize,
+          hasSeparateOutputs ? separateSizes : ByStream<std::uint64_t>::all(outputSize),
+          !hasSeparateOutputs};
 }
 
 OwnedBatch batchOfFiveMeshes() {
@@ -620,10 +619,13 @@ OwnedBatch randomBatch(std::uint32_t seed, std::uint32_t jobs) {
     if (!normals || engine() % 2 == 0) continue;
     // Planar: first all positions, then all normals with a stride of their own.
     const std::uint32_t vertices = job.mesh.vertexCount;
-    job.positions.stride = 12 + static_cast<std::uint32_t>(engine() % 2) * 4;
-    job.normals.offset = job.positions.offset + std::uint64_t{vertices} * job.positions.stride;
-    job.normals.stride = 12 + static_cast<std::uint32_t>(engine() % 3) * 4;
-    batch.outputSize = job.normals.offset + std::uint64_t{vertices} * job.normals.stride;
+    job.places[Stream::positions].stride = 12 + static_cast<std::uint32_t>(engine() % 2) * 4;
+    job.places[Stream::normals].offset =
+        job.places[Stream::positions].offset +
+        std::uint64_t{vertices} * job.places[Stream::positions].stride;
+    job.places[Stream::normals].stride = 12 + static_cast<std::uint32_t>(engine() % 3) * 4;
+    batch.outputSize = job.places[Stream::normals].offset +
+                       std::uint64_t{vertices} * job.places[Stream::normals].stride;
   }
   return batch;
 }
@@ -651,12 +653,12 @@ VertexFormat anyFormat(std::mt19937& engine, bool (*isAllowed)(VertexFormat)) {
 /// Whether kernels can store a job's attributes.
 bool isOfWords(const Job& job, Arrangement arrangement) {
   std::uint32_t length = 0, bits = 0;
-  for (const OutputAttribute& attribute : attributesOf(job)) {
+  for (const OutputAttribute& attribute : job.places.attributes) {
     length += formatSize(attribute.format);
     bits |= formatSize(attribute.format);
   }
   const bool isMotionOfWords =
-      job.motion == Motion::none || formatSize(job.positions.format) % 4 == 0;
+      !job.places.hasMotion() || formatSize(job.places[Stream::positions].format) % 4 == 0;
   return (arrangement == Arrangement::interleaved ? length : bits) % 4 == 0 && isMotionOfWords;
 }
 
@@ -673,18 +675,22 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
     const Arrangement arrangement = separate        ? Arrangement::separate
                                     : below(2) == 0 ? Arrangement::planar
                                                     : Arrangement::interleaved;
-    job.motion = static_cast<Motion>(below(2));
+    const bool hasMotion = below(2) != 0;
     do {
-      job.positions.format = anyFormat(engine, isPositionFormat);
+      job.places[Stream::positions].format = anyFormat(engine, isPositionFormat);
       const bool normals = job.mesh.hasNormals && below(3) != 0;
-      job.normals.format = normals ? anyFormat(engine, isNormalFormat) : VertexFormat::none;
+      job.places[Stream::normals].format =
+          normals ? anyFormat(engine, isNormalFormat) : VertexFormat::none;
       const bool tangents = job.mesh.hasTangents && below(3) != 0;
-      job.tangents.format = tangents ? anyFormat(engine, isTangentFormat) : VertexFormat::none;
+      job.places[Stream::tangents].format =
+          tangents ? anyFormat(engine, isTangentFormat) : VertexFormat::none;
+      job.places[Stream::previousPositions].format =
+          hasMotion ? job.places[Stream::positions].format : VertexFormat::none;
     } while (!isOfWords(job, arrangement));
     job.box = {{-1, -2, -3}, {4, 5, static_cast<float>(6 + below(9))}};
     job.bounds = below(3) == 0;
-    job.restartsMotion = job.motion != Motion::none && below(4) == 0;
-    job.settles = job.motion != Motion::none && below(4) == 0;
+    job.restartsMotion = job.places.hasMotion() && below(4) == 0;
+    job.settles = job.places.hasMotion() && below(4) == 0;
     if (below(2) == 0) job.morphs = batch.keep(randomMorphs(engine, job.mesh.morphTargetCount));
     batch.place(job, arrangement, below(3) * 4);
   }
@@ -697,14 +703,8 @@ DeviceLimits richLimits() {
   return limits;
 }
 
-std::array<OutputAttribute, streamCount> attributesOf(const Job& job) {
-  OutputAttribute previous = job.previousPositions;
-  previous.format = job.motion == Motion::none ? VertexFormat::none : job.positions.format;
-  return {job.positions, job.normals, job.tangents, previous};
-}
-
 bool wantsResult(const Job& job) {
-  return job.bounds || isSnormPosition(job.positions.format);
+  return job.bounds || isSnormPosition(job.places[Stream::positions].format);
 }
 
 std::vector<MorphWeight> activeMorphs(std::span<const MorphWeight> morphs) {

@@ -43,7 +43,7 @@ struct OwnedBatch {
   std::uint64_t meshesSize = 0, posesSize = 0;
   std::uint64_t outputSize = 0;  ///< of the one buffer …
   bool hasSeparateOutputs = false;
-  std::array<std::uint64_t, streamCount> separateSizes{};  ///< … or of these
+  ByStream<std::uint64_t> separateSizes{};  ///< … or of these
 
   void addMesh(PackedMesh mesh);
   void addPose(std::uint32_t joints, bool mayScale);
@@ -81,8 +81,6 @@ OwnedBatch randomRichBatch(std::uint32_t seed, std::uint32_t jobs, bool separate
 /// A device with storage buffers for every attribute that may store bytes.
 DeviceLimits richLimits();
 
-/// The attributes of a job by stream; format `none` where one is not wanted.
-std::array<OutputAttribute, streamCount> attributesOf(const Job& job);
 bool wantsResult(const Job& job);
 /// What the tables must list: by rising target, none of weight 0.
 std::vector<MorphWeight> activeMorphs(std::span<const MorphWeight> morphs);

@@ -38,17 +38,19 @@ TEST(PlanStaged, EverydayVerticesWithoutGapsAreStaged) {
   EXPECT_EQ(usual.recordBytes, 24);
   EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) { job.method = Method::linear; }).staged);
   EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) {
-                job.positions.offset += 8;
-                job.normals.offset += 8;
+                job.places[Stream::positions].offset += 8;
+                job.places[Stream::normals].offset += 8;
               }).staged);
   const Variant alone = variantOf([](Job& job, DeviceLimits&) {
-    job.positions.stride = 12;
-    job.normals = {};
+    job.places[Stream::positions].stride = 12;
+    job.places[Stream::normals] = {};
   });
   EXPECT_TRUE(alone.staged && alone.recordBytes == 12);
   const Variant halves = variantOf([](Job& job, DeviceLimits&) {
-    job.positions = {job.positions.offset, 8, VertexFormat::float16x3};
-    job.normals = {job.positions.offset + 6, 8, VertexFormat::octahedral8x2};
+    job.places[Stream::positions] = {job.places[Stream::positions].offset, 8,
+                                     VertexFormat::float16x3};
+    job.places[Stream::normals] = {job.places[Stream::positions].offset + 6, 8,
+                                   VertexFormat::octahedral8x2};
   });
   EXPECT_TRUE(halves.staged && halves.recordBytes == 8);
 }
@@ -63,19 +65,18 @@ TEST(PlanStaged, OthersAreNot) {
   EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.method = Method::logMatrix; }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.bounds = true; }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {
-    job.motion = Motion::kept;
-    job.previousPositions = {1 << 19, 12, VertexFormat::none};
+    job.places[Stream::previousPositions] = {1 << 19, 12, VertexFormat::float32x3};
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // a gap
-    job.positions.stride = job.normals.stride = 28;
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 28;
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // planar
-    job.positions.stride = job.normals.stride = 12;
-    job.normals.offset = 1 << 19;
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 12;
+    job.places[Stream::normals].offset = 1 << 19;
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // 20 bytes
-    job.positions.stride = job.normals.stride = 20;
-    job.normals.format = VertexFormat::float16x4;
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 20;
+    job.places[Stream::normals].format = VertexFormat::float16x4;
   }));
 }
 
@@ -91,12 +92,12 @@ TEST(PlanStaged, NeedNoFurtherPipelines) {
   EXPECT_EQ(count(), staged);
 
   Job job;
-  job.positions = {0, 24, VertexFormat::float32x3};
-  job.normals = {12, 24, VertexFormat::float32x3};
+  job.places[Stream::positions] = {0, 24, VertexFormat::float32x3};
+  job.places[Stream::normals] = {12, 24, VertexFormat::float32x3};
   const std::vector<Variant> all = *everyVariant(job, stagingLimits(), {});
   for (std::uint64_t moved = 0; moved < 96; moved += 4) {
-    job.positions.offset = moved;
-    job.normals.offset = moved + 12;
+    job.places[Stream::positions].offset = moved;
+    job.places[Stream::normals].offset = moved + 12;
     EXPECT_EQ(*everyVariant(job, stagingLimits(), {}), all) << moved;
   }
 }

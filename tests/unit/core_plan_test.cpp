@@ -140,7 +140,7 @@ TEST(Plan, VariantsOfAllOtherMembersHaveDifferentIds) {
   };
   for (const Kernel kernel : {Kernel::palette, Kernel::skin}) {
     for (const Method method : allMethods) {
-      for (const Motion motion : {Motion::none, Motion::kept}) {
+      for (const bool motion : {false, true}) {
         for (int flags = 0; flags < 32; ++flags) {
           for (const std::uint8_t influences : Bytes{0, 1, 2, 4}) {
             for (const std::uint8_t instances : Bytes{1, 3, 32}) {
@@ -190,9 +190,7 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
         for (const std::uint64_t moved :
              {0u, 8u}) {  // wide stores, where there are, and narrow ones
           Job& job = batch.jobs[0];
-          for (OutputAttribute* attribute :
-               {&job.positions, &job.normals, &job.tangents, &job.previousPositions})
-            attribute->offset += moved;
+          for (OutputAttribute& attribute : job.places.attributes) attribute.offset += moved;
           const Plan out = planned(batch, limits, tuning);
           for (const Variant& variant : variantsOf(out.pipelines())) {
             EXPECT_NE(std::find(all.begin(), all.end(), variant), all.end());
@@ -212,22 +210,21 @@ std::size_t formsOf(Method method) {
 
 /// Whether some of its attributes can be stored at once, where they stand at multiples of 12.
 bool isWide(const Job& layout) {
-  return layout.positions.stride % 12 == 0;
+  return layout.places[Stream::positions].stride % 12 == 0;
 }
 
 std::vector<Job> variedLayouts() {
   std::vector<Job> layouts(4);
-  layouts[0].positions = {0, 12, VertexFormat::float32x3};
-  layouts[1].positions = {0, 24, VertexFormat::float32x3};
-  layouts[1].normals = {12, 24, VertexFormat::float32x3};
+  layouts[0].places[Stream::positions] = {0, 12, VertexFormat::float32x3};
+  layouts[1].places[Stream::positions] = {0, 24, VertexFormat::float32x3};
+  layouts[1].places[Stream::normals] = {12, 24, VertexFormat::float32x3};
   layouts[1].bounds = true;
-  layouts[2].positions = {1004, 20, VertexFormat::snorm16x4};
+  layouts[2].places[Stream::positions] = {1004, 20, VertexFormat::snorm16x4};
   layouts[2].box = {{0, 0, 0}, {1, 1, 1}};
-  layouts[2].motion = Motion::kept;
-  layouts[2].previousPositions = {0, 12, VertexFormat::none};
-  layouts[3].positions = {0, 40, VertexFormat::float16x3};
-  layouts[3].normals = {6, 40, VertexFormat::octahedral8x2};
-  layouts[3].tangents = {5000, 4, VertexFormat::octahedral16x2};
+  layouts[2].places[Stream::previousPositions] = {0, 20, VertexFormat::snorm16x4};
+  layouts[3].places[Stream::positions] = {0, 40, VertexFormat::float16x3};
+  layouts[3].places[Stream::normals] = {6, 40, VertexFormat::octahedral8x2};
+  layouts[3].places[Stream::tangents] = {5000, 4, VertexFormat::octahedral16x2};
   return layouts;
 }
 
@@ -273,9 +270,7 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
       const std::vector<Variant> all = *everyVariant(job, limits, {});
       for (std::uint64_t moved = 0; moved < 96; moved += 8) {
         Job elsewhere = job;
-        for (OutputAttribute* attribute : {&elsewhere.positions, &elsewhere.normals,
-                                           &elsewhere.tangents, &elsewhere.previousPositions})
-          attribute->offset += moved;
+        for (OutputAttribute& attribute : elsewhere.places.attributes) attribute.offset += moved;
         EXPECT_EQ(idsOf(*everyVariant(elsewhere, limits, {})), idsOf(all));
         Batch alone = batch.batch();
         alone.jobs = {&elsewhere, 1};
@@ -283,7 +278,7 @@ TEST(Plan, EveryVariantIsForAnyOffset) {
         ASSERT_TRUE(makePlan(alone, limits, {}, plan).ok());
         const Variant variant = variantOf(plan.pipelines().back());
         EXPECT_TRUE(idsOf(all).contains(variant.id()));
-        const std::array<OutputAttribute, streamCount> attributes = attributesOf(elsewhere);
+        const ByStream<OutputAttribute>& attributes = elsewhere.places.attributes;
         const std::uint64_t record = std::max<std::uint64_t>(variant.recordBytes, 1);
         EXPECT_EQ(attributes[0].offset % record, 0u);
         for (std::size_t stream = 0; stream < streamCount; ++stream) {
@@ -309,8 +304,8 @@ TEST(Plan, AttributesThatStandApartAreNotStoredTogether) {
   OwnedBatch batch = batchOfFiveMeshes();
   const Job together = batch.addJob(0, 0, Method::dualQuaternion, true);
   Job apart = together;
-  apart.positions.offset += 96 * 1000;
-  apart.normals.offset += 96 * 2000;
+  apart.places[Stream::positions].offset += 96 * 1000;
+  apart.places[Stream::normals].offset += 96 * 2000;
   batch.jobs.push_back(apart);
   batch.outputSize = 96 * 4000;
   Plan plan;

@@ -50,7 +50,9 @@ TEST_P(PlanWindows, EveryWriteLiesInItsRange) {
     OwnedBatch batch = randomBatch(seed, 60);
     // Planar normals lie too far from their positions to share a range as short as these.
     std::erase_if(batch.jobs, [range = range](const Job& job) {
-      return job.normals.stride != 0 && job.normals.offset - job.positions.offset > range / 16 / 2;
+      return job.places[Stream::normals].stride != 0 &&
+             job.places[Stream::normals].offset - job.places[Stream::positions].offset >
+                 range / 16 / 2;
     });
     ASSERT_GT(batch.outputSize, range);
     Plan out;
@@ -98,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(Plan, PlanWindows,
 TEST(Plan, AnInstanceLongerThanARangeIsCutByVertices) {
   OwnedBatch batch(meshOf(800, 1, 1, true), 1);
   Job& job = batch.addJob(0, 0, Method::dualQuaternion, true, 800);
-  job.normals.offset += 100;
+  job.places[Stream::normals].offset += 100;
   const DeviceLimits limits = limitsOf(65536, 256);
   ASSERT_GT(batch.outputSize, 9 * limits.maxStorageBufferRange);
   const Plan out = planned(batch, limits, {64, 4});
@@ -127,7 +129,7 @@ TEST(Plan, AttributesThatLieFarApartFitOrAreRefused) {
   int good = 0, refused = 0, differ = 0;
   for (std::uint64_t apart = 12; apart < 65536; apart += apart < 10000 ? 332 : 7332) {
     SCOPED_TRACE(apart);
-    job.normals.offset = job.positions.offset + apart;
+    job.places[Stream::normals].offset = job.places[Stream::positions].offset + apart;
     Plan out = planned(batch, limitsOf(65536, 256), {64, 4});
     const std::vector<PlannedDispatch> dispatches = dispatchesOf(out);
     const bool sharesWindows =
@@ -163,7 +165,8 @@ TEST(Plan, AttributesThatLieNearShareAWindow) {
         batch.jobs.clear();
         batch.outputSize = offset;
         Job& job = batch.addJob(0, 0, Method::linear, true, stride);
-        job.normals.offset = job.positions.offset + apart;  // before or after
+        job.places[Stream::normals].offset =
+            job.places[Stream::positions].offset + apart;  // before or after
         batch.outputSize += 4096;
         Plan out;
         const Result<void> result = makePlan(batch.batch(), limits, {64, 4}, out);
@@ -176,15 +179,14 @@ TEST(Plan, AttributesThatLieNearShareAWindow) {
 TEST(Plan, PlanarAttributesOfOneHugeOutputLieInDifferentWindows) {
   OwnedBatch batch(meshOf(1000, 1, 1, MeshParts{true, true, 0}), 1);
   Job job = batch.jobOf(0, 0, Method::linear);
-  job.normals.format = VertexFormat::octahedral16x2;
-  job.tangents.format = VertexFormat::snorm8x4;
-  job.motion = Motion::kept;
+  job.places[Stream::normals].format = VertexFormat::octahedral16x2;
+  job.places[Stream::tangents].format = VertexFormat::snorm8x4;
   const std::uint64_t gigabyte = std::uint64_t{1} << 30;
   batch.outputSize = 4 * gigabyte;
-  job.positions = {3 * gigabyte, 12, VertexFormat::float32x3};
-  job.normals = {gigabyte, 4, VertexFormat::octahedral16x2};
-  job.tangents = {0, 4, VertexFormat::snorm8x4};
-  job.previousPositions = {4 * gigabyte - 12000, 12};
+  job.places[Stream::positions] = {3 * gigabyte, 12, VertexFormat::float32x3};
+  job.places[Stream::normals] = {gigabyte, 4, VertexFormat::octahedral16x2};
+  job.places[Stream::tangents] = {0, 4, VertexFormat::snorm8x4};
+  job.places[Stream::previousPositions] = {4 * gigabyte - 12000, 12, VertexFormat::float32x3};
   batch.jobs.push_back(job);
   const Plan out = planned(batch, richLimits());
   ASSERT_EQ(dispatchesOf(out).size(), 1u);
@@ -201,11 +203,11 @@ TEST(Plan, ABufferWithinARangeHasNoWindowsBesideOneThatIsLarger) {
   batch.hasSeparateOutputs = true;
   for (std::uint64_t instance = 0; instance < 3; ++instance) {
     Job job = batch.jobOf(0, 0, Method::linear);
-    job.positions = {instance * 1000 * 64, 64, VertexFormat::float32x3};
-    job.normals = {instance * 1000 * 16, 16, VertexFormat::octahedral16x2};
+    job.places[Stream::positions] = {instance * 1000 * 64, 64, VertexFormat::float32x3};
+    job.places[Stream::normals] = {instance * 1000 * 16, 16, VertexFormat::octahedral16x2};
     batch.jobs.push_back(job);
   }
-  batch.separateSizes = {3 * 1000 * 64, 3 * 1000 * 16, 0, 0};
+  batch.separateSizes = {{3 * 1000 * 64, 3 * 1000 * 16, 0, 0}};
   const DeviceLimits limits = limitsOf(3 * 1000 * 16, 4);
   const Plan out = planned(batch, limits);
   std::set<std::uint64_t> positions, normals;
@@ -230,8 +232,8 @@ TEST(Plan, OnlyWhatLiesInTwoRangesIsCut) {
   EXPECT_EQ(runs(), 1u);
   batch.outputSize += 68;
   EXPECT_EQ(runs(), 1u);
-  job.positions.offset += 68;
-  job.normals.offset += 68;
+  job.places[Stream::positions].offset += 68;
+  job.places[Stream::normals].offset += 68;
   EXPECT_GT(runs(), 16u);
 }
 

@@ -136,7 +136,7 @@ TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereThe
   for (const bool separate : {true, false}) {
     description.limits.separateRanges = separate;
     create();
-    instance.layout.arrangement = Arrangement::planar;
+    instance.layout.planar = true;
     bool isRefused = false;
     for (int i = 0; i < 8; ++i) {
       const Result<InstanceHandle> added = scene->addInstance(instance);
@@ -146,7 +146,7 @@ TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereThe
       break;
     }
     EXPECT_NE(isRefused, separate);
-    instance.layout.arrangement = Arrangement::interleaved;
+    instance.layout.planar = false;
     for (int i = 0; i < 8; ++i) EXPECT_TRUE(scene->addInstance(instance).ok());
     frame = 0;
     EXPECT_GT(plannedRuns(), 2u);
@@ -194,7 +194,7 @@ TEST_F(SceneGrowthTest, PosesThatTheGpuWritesCanBeBoundAtTheirOffset) {
   description.limits.minStorageBufferOffsetAlignment = 256;
   create();
   for (const std::uint32_t joints : {5u, 1u, 100u, 7u, 70u}) {
-    const PoseHandle pose = scene->addPose(joints, {.writer = PoseWriter::gpu}).value();
+    const PoseHandle pose = scene->addPose(joints, {.writtenByGpu = true}).value();
     EXPECT_EQ(owner->books().posePart(pose)->offset % 256, 0u) << joints;
   }
 }
@@ -208,7 +208,7 @@ TEST_F(SceneGrowthTest, WhyThereIsNoRoomForJointsIsSaid) {
                 "buffers that the CPU writes hold 256 joints, of which 254 are in use; their "
                 "maximum is 600");
   std::vector<PoseHandle> poses(1000);
-  expectRefused(scene->addPoses(poses, 20, {.writer = PoseWriter::gpu}), ErrorCode::limitExceeded,
+  expectRefused(scene->addPoses(poses, 20, {.writtenByGpu = true}), ErrorCode::limitExceeded,
                 "1000 poses take 20000 joints in one pose buffer, which holds at most 1365");
 }
 

@@ -67,19 +67,19 @@ struct OneInstance {
   Plan& planned = owner.planned;
 };
 
-std::string nameOf(Access accesses) {
+std::string nameOf(Use uses) {
   std::string name;
-  const auto add = [&](Access read, Access write, const std::string& kind) {
-    if (!includes(accesses, read | write)) return;
+  const auto add = [&](Use read, Use write, const std::string& kind) {
+    if (!includes(uses, read | write)) return;
     if (!name.empty()) name += ", ";
     name += kind;
-    if (!includes(accesses, write)) name += " read";
-    if (!includes(accesses, read)) name += " write";
+    if (!includes(uses, write)) name += " read";
+    if (!includes(uses, read)) name += " write";
   };
-  add(Access::computeRead, Access::computeWrite, "compute");
-  add(Access::copyRead, Access::copyWrite, "copy");
-  if (includes(accesses, Access::indirectRead)) name += ", indirect";
-  if (includes(accesses, Access::hostRead)) name += "host";
+  add(Use::computeRead, Use::computeWrite, "compute");
+  add(Use::copyRead, Use::copyWrite, "copy");
+  if (includes(uses, Use::indirectRead)) name += ", indirect";
+  if (includes(uses, Use::hostRead)) name += "host";
   return name;
 }
 
@@ -290,7 +290,7 @@ TEST(Scene, WhatIsNotCommittedIsPlannedAgain) {
   EXPECT_EQ(namesOf(one.owner), all);
   const InstanceOutput early = *one.scene.output(one.instance);
   EXPECT_FALSE(early.isWritten);
-  EXPECT_EQ(early.size, 100u * 12u) << "the place is known";
+  EXPECT_EQ(early.places.size, 100u * 12u) << "the place is known";
   ASSERT_TRUE(one.owner.commit().ok());
   EXPECT_TRUE(one.scene.output(one.instance)->isWritten);
   EXPECT_EQ(one.scene.output(one.instance)->offset, early.offset);
@@ -369,7 +369,7 @@ TEST(Scene, DoesWithAnInstanceWhatTheTablesSay) {
     OneInstance one;
     must(one.scene.removeInstance(one.instance));
     one.description.bounds = false;
-    one.description.layout.motion = Motion::kept;
+    one.description.layout.motion = true;
     const InstanceHandle instance = must(one.scene.addInstance(one.description));
     std::uint64_t frame = 0;
     const auto begin = [&] {
@@ -421,7 +421,7 @@ TEST(Scene, DoesWithAnInstanceWhatTheTablesSay) {
 TEST(Scene, AfterAnAbandonedFrameEverythingIsSkinnedAndItsMotionRestarts) {
   OneInstance one;
   InstanceDescription description = one.description;
-  description.layout.motion = Motion::kept;
+  description.layout.motion = true;
   description.bounds = false;
   const InstanceHandle resting = must(one.scene.addInstance(description));
   description.pose = must(one.scene.addPose(4));
@@ -525,7 +525,7 @@ class SceneVisibility : public ::testing::TestWithParam<bool> {
     InstanceDescription description = one_.description;
     description.pose = pose_ = *scene_.addPose(4);
     description.bounds = false;
-    description.layout.motion = Motion::kept;
+    description.layout.motion = true;
     instance_ = *scene_.addInstance(description);
   }
   void show(bool isVisible) {
@@ -1004,7 +1004,7 @@ TEST(Scene, CompactionFillsEveryGapThatFits) {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> gaps;  // begin, end
   std::uint64_t end = 0;
   for (const auto& [offset, shown] : byOffset) {
-    const std::uint64_t size = must(scene.output(shown.handle)).size;
+    const std::uint64_t size = must(scene.output(shown.handle)).places.size;
     ASSERT_GE(offset, end);
     gaps.emplace_back(end, offset);
     end = offset + size;

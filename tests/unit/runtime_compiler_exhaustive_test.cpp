@@ -14,7 +14,7 @@ namespace dermis::test {
 namespace {
 
 TEST(RuntimeCompilerExhaustiveTest, UnchangedSourcesGiveTheModulesOfTheLibrary) {
-  const Result<RuntimeCompiler> compiler = RuntimeCompiler::create({kernelSources, {}});
+  const Result<RuntimeCompiler> compiler = RuntimeCompiler::create(kernelSources);
   ASSERT_TRUE(compiler.ok()) << compiler.error().message;
   const vulkan::KernelSource source = compiler->source();
   for (const kernels::Recipe& recipe : kernels::recipes) {

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 using Words = std::vector<std::uint32_t>;
 
 RuntimeCompiler compilerOf(const fs::path& folder, const fs::path& cache = {}) {
-  Result<RuntimeCompiler> compiler = RuntimeCompiler::create({folder, cache});
+  Result<RuntimeCompiler> compiler = RuntimeCompiler::create(folder, cache);
   if (!compiler) throw std::runtime_error(compiler.error().message);
   return std::move(*compiler);
 }
@@ -72,7 +72,7 @@ TEST(RuntimeCompilerTest, UnchangedSourcesGiveTheModulesOfTheLibrary) {
   }
   EXPECT_GE(recipes.size(), 12u);
   EXPECT_TRUE(std::ranges::any_of(recipes, &kernels::Recipe::scalarBlockLayout));
-  EXPECT_EQ(compiler.statistics().compiled, recipes.size());
+  EXPECT_EQ(compiler.compiledModules(), recipes.size());
 }
 
 TEST(RuntimeCompilerTest, ModulesAreKeptOnDiskAndDamageIsMended) {
@@ -88,8 +88,8 @@ TEST(RuntimeCompilerTest, ModulesAreKeptOnDiskAndDamageIsMended) {
         EXPECT_TRUE(std::ranges::equal(*words, kernels::find(name))) << name;
       }
     }
-    EXPECT_EQ(compiler.statistics().compiled, compiled);
-    EXPECT_EQ(compiler.statistics().fromCache, modules.size() - compiled);
+    EXPECT_EQ(compiler.compiledModules(), compiled);
+    EXPECT_EQ(compiler.cachedModules(), modules.size() - compiled);
     const std::vector<std::string> told = compiler.takeCacheProblems();
     ASSERT_EQ(told.size(), problems);
     for (const std::string& problem : told) {
@@ -111,7 +111,7 @@ TEST(RuntimeCompilerTest, ModulesAreKeptOnDiskAndDamageIsMended) {
 }
 
 TEST(RuntimeCompilerTest, WhatIsWrongWithTheFolderIsSaid) {
-  const Result<RuntimeCompiler> nowhere = RuntimeCompiler::create({"/nowhere", {}});
+  const Result<RuntimeCompiler> nowhere = RuntimeCompiler::create("/nowhere");
   ASSERT_FALSE(nowhere.ok());
   EXPECT_EQ(nowhere.error().code, ErrorCode::ioError);
   EXPECT_NE(nowhere.error().message.find("/nowhere"), std::string::npos) << nowhere.error().message;
@@ -119,7 +119,7 @@ TEST(RuntimeCompilerTest, WhatIsWrongWithTheFolderIsSaid) {
   const ShaderFolder folder("other_version");
   const RuntimeCompiler before = compilerOf(folder.path());
   folder.edit("abi.h", "BINDING_TABLES = 0u", "BINDING_TABLES = 7u");
-  const Result<RuntimeCompiler> other = RuntimeCompiler::create({folder.path(), {}});
+  const Result<RuntimeCompiler> other = RuntimeCompiler::create(folder.path());
   ASSERT_FALSE(other.ok());
   EXPECT_EQ(other.error().code, ErrorCode::invalidArgument);
   EXPECT_NE(other.error().message.find("use the kernels of this version"), std::string::npos)

@@ -14,7 +14,6 @@ namespace dermis::test {
 namespace {
 
 using vulkan::VertexInput;
-using vulkan::VertexInputNumbers;
 
 const std::map<VertexFormat, VkFormat> formats{
     {VertexFormat::none, VK_FORMAT_UNDEFINED},
@@ -36,8 +35,8 @@ TEST(VertexInput, EveryFormatHasTheOneThatAllDevicesReadOrNone) {
 }
 
 constexpr VertexLayout everything{VertexFormat::snorm16x4, VertexFormat::octahedral8x2,
-                                  VertexFormat::snorm8x4, Motion::kept};
-constexpr VertexInputNumbers otherNumbers{7, 5, 3, 1, 2};
+                                  VertexFormat::snorm8x4, true};
+constexpr ByStream<std::uint32_t> otherLocations{{7, 5, 3, 1}};
 
 void expectAttribute(const VkVertexInputAttributeDescription& attribute, std::uint32_t location,
                      std::uint32_t binding, VertexFormat format, std::uint64_t offset) {
@@ -49,31 +48,32 @@ void expectAttribute(const VkVertexInputAttributeDescription& attribute, std::ui
 
 TEST(VertexInput, AnInterleavedLayoutHasOneBinding) {
   const VertexPlaces places = *placeVertices(everything, 100, 200 * 24);
-  const VertexInput input = *vulkan::vertexInput(everything, otherNumbers);
+  const VertexInput input = *vulkan::vertexInput(everything, otherLocations, 2);
   ASSERT_EQ(input.bindingCount, 1u);
   EXPECT_EQ(input.bindings[0].binding, 2u);
-  EXPECT_EQ(input.bindings[0].stride, places.positions.stride);
+  EXPECT_EQ(input.bindings[0].stride, places[Stream::positions].stride);
   EXPECT_EQ(input.bindings[0].inputRate, VK_VERTEX_INPUT_RATE_VERTEX);
   ASSERT_EQ(input.attributeCount, 4u);
-  const std::uint64_t start = places.positions.offset;
+  const std::uint64_t start = places[Stream::positions].offset;
   expectAttribute(input.attributes[0], 7, 2, VertexFormat::snorm16x4, 0);
   expectAttribute(input.attributes[1], 5, 2, VertexFormat::octahedral8x2,
-                  places.normals.offset - start);
+                  places[Stream::normals].offset - start);
   expectAttribute(input.attributes[2], 3, 2, VertexFormat::snorm8x4,
-                  places.tangents.offset - start);
+                  places[Stream::tangents].offset - start);
   expectAttribute(input.attributes[3], 1, 2, VertexFormat::snorm16x4,
-                  places.previousPositions.offset - start);
+                  places[Stream::previousPositions].offset - start);
 }
 
 TEST(VertexInput, APlanarLayoutHasABindingForEachAttribute) {
   VertexLayout layout = everything;
-  layout.arrangement = Arrangement::planar;
+  layout.planar = true;
   layout.normals = VertexFormat::none;  // the numbers of bindings have no hole
   const VertexPlaces places = *placeVertices(layout, 100, 1584);
-  const VertexInput input = *vulkan::vertexInput(layout, otherNumbers);
+  const VertexInput input = *vulkan::vertexInput(layout, otherLocations, 2);
   ASSERT_EQ(input.bindingCount, 3u);
   ASSERT_EQ(input.attributeCount, 3u);
-  const std::array attributes{places.positions, places.tangents, places.previousPositions};
+  const std::array attributes{places[Stream::positions], places[Stream::tangents],
+                              places[Stream::previousPositions]};
   const std::array<std::uint32_t, 3> locations{7, 3, 1};
   for (std::uint32_t i = 0; i < 3; ++i) {
     EXPECT_EQ(input.bindings[i].binding, 2 + i);

@@ -108,21 +108,13 @@ class DERMIS_SHADER_COMPILER_API ShaderCompiler {
 // ---- Compiles the kernels of dermis::vulkan from GLSL at run time, and again when a file changes.
 // For developers of kernels. Built with DERMIS_RUNTIME_COMPILER=ON; links glslang.
 //
-//   RuntimeCompiler compiler = must(RuntimeCompiler::create({DERMIS_SHADER_DIR, cacheFolder}));
+//   RuntimeCompiler compiler = must(RuntimeCompiler::create(DERMIS_SHADER_DIR, cacheFolder));
 //   description.kernelSource = compiler.source();
 //   Context context = must(Context::create(description));
 //
 //   // Between two frames:
 //   if (Result<KernelReload> reload = compiler.reload(context, frame, completedFrame); !reload)
 //     show(reload.error().message);  // "shaders/blend.glsl:31: ..."; the old kernels stay
-
-/// Folders of a `RuntimeCompiler`.
-struct RuntimeCompilerOptions {
-  /// DERMIS_SHADER_DIR, or a copy of that folder. It is only read.
-  std::filesystem::path shaderFolder;
-  /// Where compiled modules are kept between runs: `ShaderCompilerOptions::cacheFolder`.
-  std::filesystem::path cacheFolder;
-};
 
 /// What a reload did.
 struct KernelReload {
@@ -132,12 +124,6 @@ struct KernelReload {
   /// Names of the modules whose SPIR-V changed. The next `record` uses the new SPIR-V.
   std::vector<std::string> replaced;
   std::uint32_t pipelines = 0;  ///< number of pipelines that were created for these modules
-};
-
-/// Counts since the compiler was created.
-struct RuntimeCompilerStatistics {
-  std::uint32_t compiled = 0;   ///< modules that glslang compiled
-  std::uint32_t fromCache = 0;  ///< modules that were taken from the cache folder
 };
 
 /// Supplies the kernels of a Context. Unchanged GLSL compiles to the same words as the modules in
@@ -150,10 +136,13 @@ struct RuntimeCompilerStatistics {
 /// thread calls a function of it. `prepare` may run on other threads during any call.
 class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
  public:
-  /// Compiles nothing yet. Fails with `ioError` if the folder has no `abi.h`, and with
-  /// `invalidArgument` if its `abi.h` differs from the one in this library: the folder is from
+  /// Compiles nothing yet. `shaderFolder` is DERMIS_SHADER_DIR, or a copy of that folder; it is
+  /// only read. `cacheFolder` keeps compiled modules between runs, as
+  /// `ShaderCompilerOptions::cacheFolder`. Fails with `ioError` if the folder has no `abi.h`, and
+  /// with `invalidArgument` if its `abi.h` differs from the one in this library: the folder is from
   /// another version.
-  static Result<RuntimeCompiler> create(RuntimeCompilerOptions options);
+  static Result<RuntimeCompiler> create(std::filesystem::path shaderFolder,
+                                        std::filesystem::path cacheFolder = {});
 
   ~RuntimeCompiler();
   RuntimeCompiler(RuntimeCompiler&&) noexcept;
@@ -181,8 +170,8 @@ class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
   Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
                               std::uint64_t completedFrame);
 
-  /// How many modules were compiled, and how many came from the cache.
-  RuntimeCompilerStatistics statistics() const;
+  std::uint32_t compiledModules() const;  ///< modules that glslang compiled so far
+  std::uint32_t cachedModules() const;    ///< modules that came from the cache folder so far
 
   /// Problems of the cache folder since the last call, one sentence each. For example, an entry was
   /// damaged and made again, or cannot be read or written.

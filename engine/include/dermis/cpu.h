@@ -55,35 +55,15 @@ class DERMIS_CPU_API Mesh {
 //     job.instances = instances;             // each with its pose, and memory for its vertices
 //     cpu::skin(job);
 
-/// The memory that the vertices of an instance are written to. Offsets in `Job::places` count from
-/// these addresses. For each attribute that the job writes, there must be offset + (vertexCount -
-/// 1) × stride + `formatSize` bytes. The addresses need no alignment.
-struct OutputMemory {
-  void* positions = nullptr;
-  void* normals = nullptr;
-  void* tangents = nullptr;
-  void* previousPositions = nullptr;
-
-  /// No memory.
-  constexpr OutputMemory() = default;
-  /// One address for all attributes, for the offsets that `placeVertices` returns.
-  constexpr OutputMemory(void* all)
-      : positions(all), normals(all), tangents(all), previousPositions(all) {}
-  /// An array for each attribute; null for attributes that the job does not write. The offsets in
-  /// `Job::places` are then usually 0, not those that `placeVertices` returns.
-  constexpr OutputMemory(void* positionArray, void* normalArray, void* tangentArray,
-                         void* previousArray)
-      : positions(positionArray),
-        normals(normalArray),
-        tangents(tangentArray),
-        previousPositions(previousArray) {}
-};
-
 /// One instance of a job.
 struct Instance {
-  std::span<const JointMatrix> pose;    ///< at least `MeshInfo::requiredJoints`
-  bool mayScale = true;                 ///< as `PoseDescription::mayScale`
-  OutputMemory output;                  ///< where the vertices are written
+  std::span<const JointMatrix> pose;  ///< at least `MeshInfo::requiredJoints`
+  bool mayScale = true;               ///< as `PoseDescription::mayScale`
+  /// The memory of each attribute, from which the offsets in `Job::places` count: `all(memory)` for
+  /// the offsets of `placeVertices`, or an array for each attribute, usually with offsets of 0.
+  /// Null for attributes that the job does not write. An attribute needs offset + (vertexCount - 1)
+  /// × stride + `formatSize` bytes, and no alignment.
+  ByStream<void*> output{};
   Box box;                              ///< as `dermis::Job::box`
   std::span<const MorphWeight> morphs;  ///< as `dermis::Job::morphs`, ascending by target
   bool restartsMotion = false;          ///< as `dermis::Job::restartsMotion`

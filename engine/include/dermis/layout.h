@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -133,9 +134,10 @@ DERMIS_CORE_API std::array<double, 4> decodeTangent(VertexFormat format, const v
 /// - A run begins at a multiple of 4 bytes. Its length and its stride are multiples of 4. For
 ///   example, float16x3 and octahedral8x2 are a run of 8 bytes; float32x3 and octahedral8x2 twice
 ///   are one of 16. But float16x3 alone needs float16x4 instead.
-/// - All attributes must go to one buffer (`OutputSizes::isOneBuffer`) if positions, normals and
-///   tangents, as far as they are written, are one run of at least two attributes, or if the size
-///   of one of the three is not a multiple of 4 bytes.
+/// - All attributes must go to one buffer (`Batch::isOneOutput`) if positions, normals and
+/// tangents,
+///   as far as they are written, are one run of at least two attributes, or if the size of one of
+///   the three is not a multiple of 4 bytes.
 /// - If positions and normals are float32x3, normals directly follow positions, and both have the
 ///   same stride, a multiple of 8: the offset of the positions must be a multiple of 8, and both
 ///   must be in one buffer, wherever tangents are.
@@ -145,21 +147,29 @@ struct OutputAttribute {
   VertexFormat format = VertexFormat::none;  ///< `none`: the attribute is not written
 };
 
-/// Where previous positions come from. An engine needs them for motion vectors.
-enum class Motion : std::uint8_t {
-  none = 0,  ///< there are no previous positions
-  /// Copied from the output before it is overwritten: the positions of the last time that the
-  /// instance was skinned. Costs a read and a write. The output must persist between frames.
-  kept = 1,
+/// The attributes of skinned vertices.
+enum class Stream : std::uint8_t {
+  positions = 0,
+  normals = 1,
+  tangents = 2,
+  /// For motion vectors: the positions that the output had before they were overwritten, so the
+  /// output must persist between frames. They cost a read and a write.
+  previousPositions = 3,
 };
+inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
-/// How the attributes of many vertices are arranged.
-enum class Arrangement : std::uint8_t {
-  /// One vertex after the other. In each vertex: position, normal, tangent, previous position, each
-  /// at a multiple of `formatAlignment`.
-  interleaved = 0,
-  /// One attribute after the other. Each begins at a multiple of 48 bytes.
-  planar = 1,
+/// A value for each attribute: `values[Stream::normals]`.
+template <typename T>
+struct ByStream : std::array<T, streamCount> {
+  using std::array<T, streamCount>::operator[];
+  /// The value of one attribute.
+  constexpr T& operator[](Stream stream) { return (*this)[static_cast<std::size_t>(stream)]; }
+  /// The value of one attribute.
+  constexpr const T& operator[](Stream stream) const {
+    return (*this)[static_cast<std::size_t>(stream)];
+  }
+  /// The same value for all attributes.
+  static constexpr ByStream all(const T& value) { return {{value, value, value, value}}; }
 };
 
 /// The attributes of skinned vertices, their formats and their arrangement. Method and layout
@@ -170,11 +180,13 @@ struct VertexLayout {
   VertexFormat normals = VertexFormat::none;
   /// `isTangentFormat`, or `none`. It must be `none` if the mesh has no tangents.
   VertexFormat tangents = VertexFormat::none;
-  /// Whether there are previous positions. Their format is that of the positions. In a scene they
-  /// are the positions that the output had in the last committed frame in which the instance was
-  /// visible.
-  Motion motion = Motion::none;
-  Arrangement arrangement = Arrangement::interleaved;
+  /// Whether there are previous positions, in the format of the positions. In a scene they are the
+  /// positions that the output had in the last committed frame in which the instance was visible.
+  bool motion = false;
+  /// If false, vertices are interleaved: one after the other, each with its position, normal,
+  /// tangent and previous position at multiples of `formatAlignment`. If true, there is one
+  /// attribute after the other, each at a multiple of 48 bytes.
+  bool planar = false;
   /// For interleaved layouts: bytes from one vertex to the next. It may leave room for attributes
   /// of the engine after those of Dermis. 0: the minimum, rounded up to a multiple of 4.
   std::uint32_t stride = 0;
@@ -184,12 +196,21 @@ struct VertexLayout {
 
 /// Where the attributes of all vertices of an instance are. `placeVertices` returns it.
 struct VertexPlaces {
-  OutputAttribute positions, normals, tangents, previousPositions;
-  Motion motion = Motion::none;
+  /// Positions are required. Previous positions have the same format, or `none`.
+  ByStream<OutputAttribute> attributes;
   std::uint64_t size = 0;  ///< bytes of all vertices
   /// Bytes: the offset of the vertices must be a multiple of this, which need not be a power of
   /// two. For interleaved layouts it is the stride, so that a draw can use `firstVertex`.
   std::uint64_t alignment = 1;
+
+  /// Whether there are previous positions.
+  bool hasMotion() const {
+    return attributes[Stream::previousPositions].format != VertexFormat::none;
+  }
+  OutputAttribute& operator[](Stream stream) { return attributes[stream]; }  ///< one attribute
+  const OutputAttribute& operator[](Stream stream) const {
+    return attributes[stream];
+  }  ///< one attribute
 };
 
 /// Places `vertexCount` vertices at byte `offset` of a buffer. Fails with `invalidArgument`

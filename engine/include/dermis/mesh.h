@@ -298,40 +298,26 @@ DERMIS_CORE_API const char* meshProblemName(MeshProblem problem);
 /// official glTF validator.
 DERMIS_CORE_API MeshReport validate(const MeshView& mesh, std::uint32_t jointCount);
 
-/// A repaired copy of a mesh. Owns its memory. Movable, not copyable.
+/// A repaired copy of a mesh. Owns its memory. A moved-from one may only be destroyed or assigned
+/// to.
 class DERMIS_CORE_API RepairedMesh {
  public:
-  RepairedMesh(RepairedMesh&&) = default;
-  RepairedMesh& operator=(RepairedMesh&&) = default;
-  RepairedMesh(const RepairedMesh&) = delete;
-  RepairedMesh& operator=(const RepairedMesh&) = delete;
+  ~RepairedMesh();
+  RepairedMesh(RepairedMesh&&) noexcept;
+  RepairedMesh& operator=(RepairedMesh&&) noexcept;
 
   /// The repaired mesh: float32 attributes without scale or offset, and one influence set of uint32
-  /// joints and float32 weights. The view is valid until this object is destroyed, moved or
-  /// assigned to.
-  MeshView view() const;
+  /// joints and float32 weights. The view is valid until this object is destroyed or assigned to.
+  const MeshView& view() const;
   /// What `validate` found before the repair. Problems that are `refusedByPack` are fixed now.
-  const MeshReport& report() const { return report_; }
+  const MeshReport& report() const;
 
  private:
-  RepairedMesh() = default;
+  RepairedMesh();
   friend DERMIS_CORE_API Result<RepairedMesh> repair(const MeshView& mesh,
                                                      std::uint32_t jointCount);
-
-  std::string name_;
-  std::uint32_t vertexCount_ = 0;
-  std::vector<float> positions_, normals_, tangents_, weights_;
-  std::vector<std::uint32_t> joints_;
-  std::vector<InfluenceSet> sets_;
-  struct Morph {
-    std::vector<std::uint32_t> vertices;
-    std::vector<float> positions, normals, tangents;
-  };
-  std::vector<Morph> morphs_;
-  std::vector<MorphTargetView> morphViews_;
-  std::vector<float> dualQuaternionWeights_, bulgeStrengths_, centersOfRotation_;
-  float dualQuaternionWeight_ = 0, bulgeStrength_ = 0;
-  MeshReport report_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 /// Fixes the problems that `validate` finds and `pack` refuses:
@@ -413,61 +399,28 @@ DERMIS_CORE_API Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t join
 // what is needed about the vertices, once, at import. `skinnedBounds` then takes a few microseconds
 // for a pose. docs/bounds.md has the proof.
 
-/// The extent of a set of points along 26 directions: a box with its edges and corners cut off,
-/// which stays tight when it is rotated.
-struct Extent {
-  /// `reach[2 i]` is the maximum of d · p over all points p, with d = `directions[i]`.
-  /// `reach[2 i + 1]` is the same for −d. All are -inf if there are no points.
-  float reach[26];
+struct JointBoundsData;
 
-  /// Towards the faces, edges and corners of a cube.
-  static constexpr std::int8_t directions[13][3] = {
-      {1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, -1, 0}, {1, 0, 1},  {1, 0, -1},
-      {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
-
-  /// Whether there are no points.
-  bool empty() const { return reach[0] < -reach[1]; }
-};
-
-/// The extents of the vertices in bind pose, grouped by the joints that move them. Plain data.
-/// `jointBounds` makes it once, at import. It does not depend on pose and method, and may be stored
-/// with the mesh (`bytes`, `fromBytes`).
-struct JointBounds {
-  /// A joint that moves vertices.
-  struct Joint {
-    std::uint32_t joint;  ///< index into the pose
-    Extent alone;         ///< in bind space, of the vertices that only this joint moves
-  };
-
-  /// Two joints that have vertices in common, and these vertices.
-  struct Pair {
-    std::uint32_t first, second;  ///< indices into `joints`, first < second
-    std::uint32_t influences;     ///< maximum influences of the vertices
-    Extent extent;                ///< of the vertices, in bind space
-    /// Minimum and maximum over the vertices of a = w₁ / (w₂ (k − 1)): k is the number of
-    /// influences of the vertex, w₁ and w₂ are the weights of the first and second joint.
-    float firstOverSecond[2];
-    float secondOverFirst[2];  ///< the same for b = w₂ / (w₁ (k − 1))
-    float minSum;              ///< minimum of a + b
-  };
-
-  static constexpr float infinity = std::numeric_limits<float>::infinity();
-  /// Vertices with more influences than this add no trios.
-  static constexpr std::uint32_t maxTrioInfluences = 8;
-
-  std::vector<Joint> joints;  ///< by ascending index into the pose
-  std::vector<Pair> pairs;    ///< by ascending `first`, then `second`
-  /// Three joints that have vertices in common: ascending indices into `joints`.
-  std::vector<std::array<std::uint32_t, 3>> trios;
-  /// Box of the vertices without weight, which stay in bind pose. min > max if there are none.
-  Box unweighted{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-  std::uint32_t requiredJoints = 0;  ///< minimum joints of a pose: the largest index + 1
+/// The extents of the vertices in bind pose, grouped by the joints that move them. `jointBounds`
+/// makes it once, at import. It does not depend on pose and method, and may be stored with the
+/// mesh. A default-constructed one has no vertices; a moved-from one may only be destroyed or
+/// assigned to.
+class DERMIS_CORE_API JointBounds {
+ public:
+  JointBounds();
+  ~JointBounds();
+  JointBounds(JointBounds&&) noexcept;
+  JointBounds& operator=(JointBounds&&) noexcept;
 
   /// The data as little-endian words with a version and a checksum, to store it.
-  DERMIS_CORE_API std::vector<std::byte> bytes() const;
+  std::vector<std::byte> bytes() const;
   /// Reads what `bytes` returned. It is checked, so that `skinnedBounds` never reads out of range.
   /// Fails with `invalidData` if it is damaged, or with `unsupportedVersion`.
-  DERMIS_CORE_API static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
+  static Result<JointBounds> fromBytes(std::span<const std::byte> bytes);
+
+ private:
+  friend struct JointBoundsData;
+  std::unique_ptr<JointBoundsData> data_;
 };
 
 /// The range of weights that a morph target will have.

@@ -100,9 +100,10 @@ struct Job {
   /// If `needsCentersOfRotation(method)`, the mesh must have centers of rotation.
   Method method = Method::dualQuaternion;
 
-  OutputAttribute positions;  ///< required; `isPositionFormat`
-  OutputAttribute normals;    ///< unit length; the mesh must have normals
-  OutputAttribute tangents;   ///< unit length; the mesh must have tangents
+  /// Where the vertices are written: what `placeVertices` returned, or any other attributes; its
+  /// `size` and `alignment` are not read. The mesh must have normals and tangents if they are
+  /// written. Both get unit length.
+  VertexPlaces places;
   /// The box that snorm16 positions are relative to: one of the engine's, or `skinnedBounds` of the
   /// pose. It must be finite, and each side longer than 1e-38.
   Box box;
@@ -111,24 +112,18 @@ struct Job {
   /// them. Only active targets take time.
   std::span<const MorphWeight> morphs;
 
-  Motion motion = Motion::none;  ///< where previous positions come from
-  /// Where previous positions are written. Their format is that of `positions`; the member `format`
-  /// is ignored. With `Motion::kept`, snorm16 values stay relative to the box that they were
-  /// written with.
-  OutputAttribute previousPositions;
   /// Sets previous positions to the new positions: for the first frame of an instance, and after a
-  /// teleport. Requires `motion`.
+  /// teleport. Otherwise they are those of the last time that the instance was skinned; snorm16
+  /// values stay relative to the box that they were written with.
   bool restartsMotion = false;
   /// Does not skin the instance, but sets its previous positions to the positions in the output:
-  /// for the first frame in which an instance no longer moves. Requires `motion`.
+  /// for the first frame in which an instance no longer moves. Requires previous positions, as
+  /// `restartsMotion` does.
   bool settles = false;
 
   /// Whether the box of the skinned positions is written to the results buffer, at
   /// `Plan::resultOffset`.
   bool bounds = false;
-
-  /// Sets the four attributes and `motion` from what `placeVertices` returned.
-  DERMIS_CORE_API void place(const VertexPlaces& places);
 };
 
 /// What the skin kernel writes to the results buffer for a job with `bounds` or snorm16 positions.
@@ -148,23 +143,6 @@ struct InstanceResult {
 };
 static_assert(sizeof(InstanceResult) == 32);
 
-/// Size in bytes of the output buffer of each attribute. Attributes may share a buffer.
-struct OutputSizes {
-  std::uint64_t positions = 0;
-  std::uint64_t normals = 0;
-  std::uint64_t tangents = 0;
-  std::uint64_t previousPositions = 0;
-  /// Whether all attributes share one buffer. `OutputAttribute` says when they must. If a kernel
-  /// relies on it, `record` checks that positions, normals and tangents are in the same buffer at
-  /// the same offset.
-  bool isOneBuffer = false;
-
-  /// For one buffer of `size` bytes that all attributes share.
-  static constexpr OutputSizes oneBuffer(std::uint64_t size) {
-    return {size, size, size, size, true};
-  }
-};
-
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
   /// Jobs refer to them by index. Each is converted at most once for each form that methods need.
@@ -172,17 +150,13 @@ struct Batch {
   std::span<const Job> jobs;     ///< one for each instance
   std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
   std::uint64_t posesSize = 0;   ///< bytes of the poses buffer
-  OutputSizes outputs;
+  /// Bytes of the output buffer of each attribute: `all(size)` if they share one.
+  ByStream<std::uint64_t> outputSizes{};
+  /// Whether all attributes share one buffer. `OutputAttribute` says when they must. If a kernel
+  /// relies on it, `record` checks that positions, normals and tangents are in the same buffer at
+  /// the same offset.
+  bool isOneOutput = true;
 };
-
-/// The four attributes of an output, in the order of the arrays below.
-enum class Stream : std::uint8_t {
-  positions = 0,
-  normals = 1,
-  tangents = 2,
-  previousPositions = 3
-};
-inline constexpr std::size_t streamCount = 4;  ///< number of values of `Stream`
 
 /// A compute pipeline: one of Dermis' kernels with values for its specialization constants. The
 /// number is the same in every process that uses this version of Dermis. `Context::prepare` builds
@@ -320,28 +294,41 @@ struct ClearCommand {
   BufferPart part;
 };
 
-/// Kinds of access to the buffers of a plan. They are combined with `|`.
-enum class Access : std::uint8_t {
-  computeRead = 1,
-  computeWrite = 2,
-  copyRead = 4,
-  copyWrite = 8,  ///< by copies and clears
-  indirectRead = 16,
-  hostRead = 32,
+/// How commands use a buffer. Combine uses by `|`.
+enum class Use : std::uint32_t {
+  /// All that a plan reads and writes. A scene orders its own frames; between two records of
+  /// batches with the same buffers, the engine records a barrier.
+  dermis = 1,
+  vertexInput = 2,   ///< draws, as a vertex buffer
+  vertexShader = 4,  ///< this and the next four: as a storage or texel buffer that is only read
+  fragmentShader = 8,
+  taskShader = 16,  ///< of VK_EXT_mesh_shader
+  meshShader = 32,
+  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline
+  accelerationStructureBuild = 128,  ///< the geometry of a build or refit
+  computeRead = 256,
+  computeWrite = 512,
+  copyRead = 1024,   ///< vkCmdCopyBuffer
+  copyWrite = 2048,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
+  hostRead = 4096,   ///< through a mapping, after a fence
+  /// Through a mapping. What is written before the submission needs no barrier: vkQueueSubmit makes
+  /// it visible.
+  hostWrite = 8192,
+  indirectRead = 16384,  ///< the arguments of indirect dispatches and draws
 };
-/// Both kinds of access.
-constexpr Access operator|(Access a, Access b) {
-  return static_cast<Access>(static_cast<std::uint8_t>(a) | static_cast<std::uint8_t>(b));
+/// Both uses.
+constexpr Use operator|(Use a, Use b) {
+  return static_cast<Use>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
 }
-/// Whether `accesses` include `one`.
-constexpr bool includes(Access accesses, Access one) {
-  return (static_cast<std::uint8_t>(accesses) & static_cast<std::uint8_t>(one)) != 0;
+/// Whether `uses` include `one`.
+constexpr bool includes(Use uses, Use one) {
+  return (static_cast<std::uint32_t>(uses) & static_cast<std::uint32_t>(one)) != 0;
 }
 
-/// vkCmdPipelineBarrier with a VkMemoryBarrier: accesses `before` it are complete and visible to
-/// accesses `after` it.
+/// vkCmdPipelineBarrier with the VkMemoryBarrier of `vulkan::barrierBetween`. Uses are from
+/// `computeRead` on, without `hostWrite`.
 struct BarrierCommand {
-  Access before, after;
+  Use before, after;
 };
 
 /// One command of a plan.

@@ -74,15 +74,12 @@ struct SceneDescription {
   Capacity boundsCapacity{64};
 };
 
-/// Who writes the joint matrices of a pose.
-enum class PoseWriter : std::uint8_t {
-  cpu = 0,  ///< the CPU, to memory that `writePose` returns in each frame
-  gpu = 1,  ///< a GPU pass of the engine, always to the same memory; the engine calls `markWritten`
-};
-
 /// What is fixed when a pose is added.
 struct PoseOptions {
-  PoseWriter writer = PoseWriter::cpu;
+  /// Who writes the joint matrices. If false: the CPU, to memory that `writePose` returns in each
+  /// frame. If true: a GPU pass of the engine, always to the same memory; the engine then calls
+  /// `markWritten`.
+  bool writtenByGpu = false;
   bool mayScale = true;  ///< as `PoseDescription::mayScale`
 };
 
@@ -91,7 +88,7 @@ struct InstanceDescription {
   MeshHandle mesh = {};
   PoseHandle pose = {};  ///< instances may share one, for example body, clothes and hair
   Method method = Method::dualQuaternion;
-  /// Formats and arrangement of the skinned vertices. With `Motion::kept`, the scene keeps previous
+  /// Formats and arrangement of the skinned vertices. With `motion`, the scene keeps previous
   /// positions right on the first frame, while the pose rests, between updates, and when the
   /// instance becomes visible. The engine reports jumps with `InstanceChange::teleports`.
   VertexLayout layout = {};
@@ -158,9 +155,7 @@ struct InstanceOutput {
   /// Bytes from the beginning of the buffer. For interleaved layouts it is a multiple of the
   /// stride, so that a draw can use `firstVertex` instead of a vertex-buffer offset.
   std::uint64_t offset = 0;
-  std::uint64_t size = 0;  ///< bytes
-  /// The attributes. Their offsets count from the beginning of the buffer.
-  OutputAttribute positions, normals, tangents, previousPositions;
+  VertexPlaces places;  ///< the offsets count from the beginning of the buffer
 };
 
 /// Indices of a mesh in the index buffer of the engine.
@@ -249,8 +244,8 @@ class DERMIS_CORE_API Scene {
 
   /// Adds a pose. All its joint matrices are identities until `writePose`; those of a pose that the
   /// GPU writes are undefined until a pass of the engine writes them. Fails with `invalidArgument`
-  /// if `jointCount` is not from 1 to `maxPoseJoints`, if the writer is not valid, or if it is the
-  /// GPU for a scene on the CPU, and with `limitExceeded` if there is no room.
+  /// if `jointCount` is not from 1 to `maxPoseJoints`, or if the GPU writes the pose of a scene on
+  /// the CPU, and with `limitExceeded` if there is no room.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
   /// writes are consecutive in one buffer: each begins `jointCount` matrices after the one before

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "attribute.h"
 #include "dermis/mesh.h"
@@ -67,46 +69,56 @@ bool isGoodInfluence(double weight, std::uint32_t joint, std::uint32_t jointCoun
 
 }  // namespace
 
-MeshView RepairedMesh::view() const {
-  MeshView mesh;
-  mesh.name = name_;
-  mesh.vertexCount = vertexCount_;
-  mesh.positions = viewOf(positions_, 3);
-  mesh.normals = viewOf(normals_, 3);
-  mesh.tangents = viewOf(tangents_, 4);
-  mesh.influenceSets = sets_;
-  mesh.morphTargets = morphViews_;
-  mesh.dualQuaternionWeights = viewOf(dualQuaternionWeights_, 1);
-  mesh.dualQuaternionWeight = dualQuaternionWeight_;
-  mesh.bulgeStrengths = viewOf(bulgeStrengths_, 1);
-  mesh.bulgeStrength = bulgeStrength_;
-  mesh.centersOfRotation = viewOf(centersOfRotation_, 3);
-  return mesh;
+struct RepairedMesh::State {
+  struct Morph {
+    std::vector<std::uint32_t> vertices;
+    std::vector<float> positions, normals, tangents;
+  };
+
+  std::string name;
+  std::vector<float> positions, normals, tangents, weights;
+  std::vector<std::uint32_t> joints;
+  std::vector<float> dualQuaternionWeights, bulgeStrengths, centersOfRotation;
+  std::vector<Morph> morphs;
+  InfluenceSet set;
+  std::vector<MorphTargetView> morphViews;
+  MeshView view;
+  MeshReport report;
+};
+
+RepairedMesh::RepairedMesh() : state_(std::make_unique<State>()) {}
+RepairedMesh::~RepairedMesh() = default;
+RepairedMesh::RepairedMesh(RepairedMesh&&) noexcept = default;
+RepairedMesh& RepairedMesh::operator=(RepairedMesh&&) noexcept = default;
+
+const MeshView& RepairedMesh::view() const {
+  return state_->view;
+}
+const MeshReport& RepairedMesh::report() const {
+  return state_->report;
 }
 
 Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
   MeshReport report = validate(mesh, jointCount);
   if (!report.repairable()) return Error{ErrorCode::invalidMesh, report.findings.front().message};
 
-  RepairedMesh repaired;
-  repaired.name_ = mesh.name;
-  repaired.vertexCount_ = mesh.vertexCount;
-  repaired.positions_ = copyFinitePositions(mesh);
-  repaired.normals_ = copyFinite(mesh.normals, 3);
-  repaired.tangents_ = copyFinite(mesh.tangents, 4);
-  repaired.dualQuaternionWeights_ = copyShares(mesh.dualQuaternionWeights);
-  repaired.dualQuaternionWeight_ = clampedShare(mesh.dualQuaternionWeight);
-  repaired.bulgeStrengths_ = copyShares(mesh.bulgeStrengths);
-  repaired.bulgeStrength_ = clampedShare(mesh.bulgeStrength);
-  repaired.centersOfRotation_ = copyFinite(mesh.centersOfRotation, 3);
+  RepairedMesh result;
+  RepairedMesh::State& repaired = *result.state_;
+  repaired.name = mesh.name;
+  repaired.positions = copyFinitePositions(mesh);
+  repaired.normals = copyFinite(mesh.normals, 3);
+  repaired.tangents = copyFinite(mesh.tangents, 4);
+  repaired.dualQuaternionWeights = copyShares(mesh.dualQuaternionWeights);
+  repaired.bulgeStrengths = copyShares(mesh.bulgeStrengths);
+  repaired.centersOfRotation = copyFinite(mesh.centersOfRotation, 3);
   for (const MorphTargetView& target : mesh.morphTargets) {
-    repaired.morphs_.push_back({{target.vertices.begin(), target.vertices.end()},
-                                copyFiniteDisplacements(target),
-                                copyFinite(target.normals, 3),
-                                copyFinite(target.tangents, 3)});
+    repaired.morphs.push_back({{target.vertices.begin(), target.vertices.end()},
+                               copyFiniteDisplacements(target),
+                               copyFinite(target.normals, 3),
+                               copyFinite(target.tangents, 3)});
   }
-  for (const RepairedMesh::Morph& morph : repaired.morphs_) {
-    MorphTargetView& view = repaired.morphViews_.emplace_back();
+  for (const RepairedMesh::State::Morph& morph : repaired.morphs) {
+    MorphTargetView& view = repaired.morphViews.emplace_back();
     view.vertices = morph.vertices;
     view.positions = viewOf(morph.positions, 3);
     view.normals = viewOf(morph.normals, 3);
@@ -116,26 +128,39 @@ Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
   std::uint32_t slots = 0;
   for (const InfluenceSet& set : mesh.influenceSets) slots += set.weights.components;
   const std::size_t total = std::size_t{mesh.vertexCount} * slots;
-  repaired.joints_.reserve(total);
-  repaired.weights_.reserve(total);
+  repaired.joints.reserve(total);
+  repaired.weights.reserve(total);
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     for (const InfluenceSet& set : mesh.influenceSets) {
       for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
         const double weight = loadWeight(set.weights, vertex, slot);
         const std::uint32_t joint = loadJoint(set.joints, vertex, slot);
         const bool good = isGoodInfluence(weight, joint, jointCount);
-        repaired.joints_.push_back(good ? joint : 0);
-        repaired.weights_.push_back(good ? static_cast<float>(weight / wholeWeight) : 0.0f);
+        repaired.joints.push_back(good ? joint : 0);
+        repaired.weights.push_back(good ? static_cast<float>(weight / wholeWeight) : 0.0f);
       }
     }
   }
 
-  InfluenceSet set;
-  set.joints = {repaired.joints_.data(), mesh.vertexCount, slots * 4, ComponentType::uint32, slots};
-  set.weights = floatAttribute(repaired.weights_.data(), mesh.vertexCount, slots);
-  repaired.sets_.push_back(set);
-  repaired.report_ = std::move(report);
-  return repaired;
+  InfluenceSet& set = repaired.set;
+  set.joints = {repaired.joints.data(), mesh.vertexCount, slots * 4, ComponentType::uint32, slots};
+  set.weights = floatAttribute(repaired.weights.data(), mesh.vertexCount, slots);
+
+  MeshView& view = repaired.view;
+  view.name = repaired.name;
+  view.vertexCount = mesh.vertexCount;
+  view.positions = viewOf(repaired.positions, 3);
+  view.normals = viewOf(repaired.normals, 3);
+  view.tangents = viewOf(repaired.tangents, 4);
+  view.influenceSets = {&set, 1};
+  view.morphTargets = repaired.morphViews;
+  view.dualQuaternionWeights = viewOf(repaired.dualQuaternionWeights, 1);
+  view.dualQuaternionWeight = clampedShare(mesh.dualQuaternionWeight);
+  view.bulgeStrengths = viewOf(repaired.bulgeStrengths, 1);
+  view.bulgeStrength = clampedShare(mesh.bulgeStrength);
+  view.centersOfRotation = viewOf(repaired.centersOfRotation, 3);
+  repaired.report = std::move(report);
+  return result;
 }
 
 }  // namespace dermis

@@ -281,14 +281,14 @@ DERMIS_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float*
 }
 
 inline bool areSideBySide(const VertexPlaces& places) {
-  return places.positions.format == VertexFormat::float32x3 &&
-         places.normals.format == VertexFormat::float32x3 &&
-         places.positions.stride == vertexFloats * sizeof(float) &&
-         places.normals.stride == places.positions.stride;
+  return places[Stream::positions].format == VertexFormat::float32x3 &&
+         places[Stream::normals].format == VertexFormat::float32x3 &&
+         places[Stream::positions].stride == vertexFloats * sizeof(float) &&
+         places[Stream::normals].stride == places[Stream::positions].stride;
 }
 inline bool areSideBySide(const TaskInstance& instance) {
-  const std::byte* const positions = instance.output(Stream::positions);
-  return instance.output(Stream::normals) == positions + 3 * sizeof(float) &&
+  const std::byte* const positions = instance.outputs[Stream::positions];
+  return instance.outputs[Stream::normals] == positions + 3 * sizeof(float) &&
          reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
 }
 

@@ -563,8 +563,8 @@ DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, 
   const MeshData& mesh = *job.mesh;
   const VertexPlaces& places = job.places;
   const std::size_t vertex = std::size_t{block} * blockVertices + lane;
-  const auto placeOf = [&](Stream stream, const OutputAttribute& attribute) {
-    return task.instance.output(stream) + vertex * attribute.stride;
+  const auto placeOf = [&](Stream stream) {
+    return task.instance.outputs[stream] + vertex * places[stream].stride;
   };
   const std::uint64_t slot = task.run.slotOf(block) + lane * task.run.influences;
   const Slots slots{mesh.jointNumbers.data() + slot, mesh.pairNumbers.data() + slot,
@@ -577,11 +577,11 @@ DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, 
   if (job.method == Method::bulgeControlled)
     inputs.share = hn::Load(d, mesh.bulgeStrengths[block].v + lane);
 
-  const Wanted<tangents> wanted{places.normals.format != VertexFormat::none};
+  const Wanted<tangents> wanted{places[Stream::normals].format != VertexFormat::none};
   const Vertex<D> skinned =
       skinVertex<scales>(d, job.method, bindVertex(d, mesh, block, lane, morphed, wanted), slots,
                          task.palette, inputs, wanted);
-  const VertexFormat format = places.positions.format;
+  const VertexFormat format = places[Stream::positions].format;
   const std::uint32_t bytes = task.sizes[0];
   const auto encode = [&](const Vec3<D>& position) HWY_ATTR {
     if (!isSnormPosition(format)) return encodePosition(d, format, position);
@@ -597,28 +597,28 @@ DERMIS_INLINE void skinLanes(D d, const GeneralTask& task, std::uint32_t block, 
   };
   if (task.instance.result != nullptr)
     addPositions(d, skinned.position, lanesFrom(d, first, end), findings);
-  std::byte* const to = placeOf(Stream::positions, places.positions);
-  std::byte* const toPrevious = placeOf(Stream::previousPositions, places.previousPositions);
+  std::byte* const to = placeOf(Stream::positions);
+  std::byte* const toPrevious = placeOf(Stream::previousPositions);
   const Encoded<D> encoded = encode(skinned.position);
-  if (places.motion == Motion::kept && !task.instance.restartsMotion) {
-    copyLanes(toPrevious, places.previousPositions.stride, to, places.positions.stride, bytes,
-              first, end);
-  } else if (places.motion != Motion::none) {
-    storeLanes(d, encoded, bytes, toPrevious, places.previousPositions.stride, first, end);
+  if (places.hasMotion() && !task.instance.restartsMotion) {
+    copyLanes(toPrevious, places[Stream::previousPositions].stride, to,
+              places[Stream::positions].stride, bytes, first, end);
+  } else if (places.hasMotion()) {
+    storeLanes(d, encoded, bytes, toPrevious, places[Stream::previousPositions].stride, first, end);
   }
   if (task.areSideBySide && end - first == hn::MaxLanes(d)) {
     storeWhole(d, skinned.position, skinned.normal, reinterpret_cast<float*>(to));
   } else {
-    storeLanes(d, encoded, bytes, to, places.positions.stride, first, end);
+    storeLanes(d, encoded, bytes, to, places[Stream::positions].stride, first, end);
     if (wanted.normals) {
-      storeLanes(d, encodeNormal(d, places.normals.format, skinned.normal), task.sizes[1],
-                 placeOf(Stream::normals, places.normals), places.normals.stride, first, end);
+      storeLanes(d, encodeNormal(d, places[Stream::normals].format, skinned.normal), task.sizes[1],
+                 placeOf(Stream::normals), places[Stream::normals].stride, first, end);
     }
   }
   if constexpr (tangents) {
-    storeLanes(d, encodeTangent(d, places.tangents.format, skinned.tangent, skinned.hand),
-               task.sizes[2], placeOf(Stream::tangents, places.tangents), places.tangents.stride,
-               first, end);
+    storeLanes(d, encodeTangent(d, places[Stream::tangents].format, skinned.tangent, skinned.hand),
+               task.sizes[2], placeOf(Stream::tangents), places[Stream::tangents].stride, first,
+               end);
   }
 }
 
@@ -643,7 +643,7 @@ inline HWY_ATTR void skinRun(const GeneralTask& task, Findings& findings) {
 }
 
 inline HWY_ATTR void skinGeneral(const GeneralTask& task, Findings& findings) {
-  const bool tangents = task.task.places.tangents.format != VertexFormat::none;
+  const bool tangents = task.task.places[Stream::tangents].format != VertexFormat::none;
   if (task.palette.scales) {
     tangents ? skinRun<true, true>(task, findings) : skinRun<true, false>(task, findings);
   } else {

@@ -39,9 +39,10 @@ inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& fi
 /// Copies positions to the previous positions.
 inline void settle(const Task& task, const TaskInstance& instance, std::uint32_t first,
                    std::uint32_t end) {
-  const OutputAttribute &from = task.places.positions, &to = task.places.previousPositions;
-  copyLanes(instance.output(Stream::previousPositions), to.stride,
-            instance.output(Stream::positions), from.stride, formatSize(from.format), first, end);
+  const OutputAttribute &from = task.places[Stream::positions],
+                        &to = task.places[Stream::previousPositions];
+  copyLanes(instance.outputs[Stream::previousPositions], to.stride,
+            instance.outputs[Stream::positions], from.stride, formatSize(from.format), first, end);
 }
 
 inline void write(const Findings& findings, const TaskInstance& instance) {
@@ -65,7 +66,7 @@ inline void write(const Findings& findings, const TaskInstance& instance) {
 inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& instance) {
   const Task& task = part.task;
   const MeshData& mesh = *part.task.mesh;
-  if (instance.settles && task.places.motion != Motion::none) {
+  if (instance.settles && task.places.hasMotion()) {
     settle(task, instance, part.firstVertex, part.vertexEnd);
     return;
   }
@@ -83,8 +84,9 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
                  palette,
                  first,
                  end,
-                 {formatSize(task.places.positions.format), formatSize(task.places.normals.format),
-                  formatSize(task.places.tangents.format)},
+                 {formatSize(task.places[Stream::positions].format),
+                  formatSize(task.places[Stream::normals].format),
+                  formatSize(task.places[Stream::tangents].format)},
                  areSideBySide(task.places) && areSideBySide(instance)},
                 findings);
   }
@@ -97,7 +99,7 @@ inline HWY_ATTR void skinGenerally(const SectionTask& part, const TaskInstance& 
 
 inline bool isPlainTask(const Task& task) {
   return (task.method == Method::dualQuaternion || task.method == Method::linear) &&
-         task.places.motion == Motion::none && task.places.tangents.format == VertexFormat::none &&
+         !task.places.hasMotion() && task.places[Stream::tangents].format == VertexFormat::none &&
          areSideBySide(task.places);
 }
 
@@ -326,7 +328,7 @@ inline HWY_ATTR void skinPlainly(const SectionTask& part) {
   PlainGroup group, scaled;
   group.assign(part.scratch[1], joints.size(), moves ? joints.size() * 12 : pairs * 8);
   const auto add = [&](PlainGroup& to, const TaskInstance& instance) {
-    to.outputs[to.count] = reinterpret_cast<float*>(instance.output(Stream::positions));
+    to.outputs[to.count] = reinterpret_cast<float*>(instance.outputs[Stream::positions]);
     to.poses[to.count++] = instance.pose;
   };
   for (const TaskInstance& instance : task.instances) {

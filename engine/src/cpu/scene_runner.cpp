@@ -256,13 +256,12 @@ void SceneRunner::State::addGroup(const Group& group, std::uint64_t verticesPerJ
   Task task;
   task.mesh = &dataOf(meshes.find(group.key.mesh)->second);
   task.method = variant.method;
-  const std::array<std::uint32_t, streamCount>& strides = group.key.strides;
-  task.places.motion = variant.motion;
-  task.places.positions = {0, strides[0], variant.positions};
-  task.places.normals = {0, strides[1], variant.normals};
-  task.places.tangents = {0, strides[2], variant.tangents};
-  task.places.previousPositions = {
-      0, strides[3], variant.motion == Motion::none ? VertexFormat::none : variant.positions};
+  const ByStream<std::uint32_t>& strides = group.key.strides;
+  task.places[Stream::positions] = {0, strides[0], variant.positions};
+  task.places[Stream::normals] = {0, strides[1], variant.normals};
+  task.places[Stream::tangents] = {0, strides[2], variant.tangents};
+  task.places[Stream::previousPositions] = {
+      0, strides[3], variant.motion ? variant.positions : VertexFormat::none};
   task.firstVertex = group.key.firstVertex;
   task.vertexEnd = group.key.vertexEnd;
   addInstances(task, group.firstInstance, group.instances, verticesPerJob);

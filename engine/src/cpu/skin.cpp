@@ -24,18 +24,16 @@ Result<void> checkLayout(const Job& job) {
   dermis::Job checked;
   checked.mesh = info;
   checked.method = job.method;
-  checked.place(job.places);
+  checked.places = job.places;
   // Offsets are relative to the engine's addresses.
-  for (OutputAttribute* attribute :
-       {&checked.positions, &checked.normals, &checked.tangents, &checked.previousPositions})
-    attribute->offset = 0;
+  for (OutputAttribute& attribute : checked.places.attributes) attribute.offset = 0;
   checked.box = {{-1, -1, -1}, {1, 1, 1}};
   const PoseDescription pose{info.requiredJoints, 0, true};
   Batch batch;
   batch.poses = {&pose, 1};
   batch.meshesSize = info.byteSize;
   batch.posesSize = info.requiredJoints * sizeof(JointMatrix);
-  batch.outputs = OutputSizes::oneBuffer(~std::uint64_t{0} / 4 * 4);
+  batch.outputSizes.fill(~std::uint64_t{0} / 4 * 4);
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
   return checkJob(batch, checked, outputStreams(checked), {"the job"}, limits);
@@ -50,27 +48,21 @@ Result<void> checkPose(std::span<const JointMatrix> pose, const MeshInfo& info,
 
 Result<void> checkInstance(const Job& job, const Instance& instance, const Subject& subject) {
   const MeshInfo& info = job.mesh->info();
-  for (const auto& [attribute, memory, name] :
-       {std::tuple{&job.places.positions, instance.output.positions, "positions"},
-        {&job.places.normals, instance.output.normals, "normals"},
-        {&job.places.tangents, instance.output.tangents, "tangents"},
-        {&job.places.previousPositions, instance.output.previousPositions, "previous positions"}}) {
-    const bool isWanted = attribute == &job.places.previousPositions
-                              ? job.places.motion != Motion::none
-                              : attribute->format != VertexFormat::none;
-    if (isWanted && memory == nullptr)
-      return wrong(subject.name() + " has no output for its " + name);
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (job.places.attributes[stream].format != VertexFormat::none &&
+        instance.output[stream] == nullptr)
+      return wrong(subject.name() + " has no output for its " + streamName(stream));
   }
   if (Result<void> good = checkPose(instance.pose, info, subject); !good) return good;
   if (Result<void> good = checkMorphs(instance.morphs, info.morphTargetCount, subject); !good)
     return good;
   if (!std::ranges::is_sorted(instance.morphs, {}, &MorphWeight::target))
     return wrong(subject.name() + ": its morph targets are not in ascending order");
-  if (isSnormPosition(job.places.positions.format) && !isBox(instance.box)) {
+  if (isSnormPosition(job.places[Stream::positions].format) && !isBox(instance.box)) {
     return wrong(subject.name() +
                  ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }
-  if (job.places.motion == Motion::none && (instance.settles || instance.restartsMotion)) {
+  if (!job.places.hasMotion() && (instance.settles || instance.restartsMotion)) {
     return wrong(subject.name() + " settles or restarts its motion, but has no previous positions");
   }
   return {};
@@ -102,14 +94,11 @@ TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) 
   own.settles = instance.settles;
   own.morphs = instance.morphs;
   own.result = instance.result;
-  const auto at = [](void* memory, const OutputAttribute& attribute) {
-    return memory == nullptr ? nullptr : static_cast<std::byte*>(memory) + attribute.offset;
-  };
-  own.outputs = {at(instance.output.positions, places.positions),
-                 at(instance.output.normals, places.normals),
-                 at(instance.output.tangents, places.tangents),
-                 at(instance.output.previousPositions, places.previousPositions)};
-  if (isSnormPosition(places.positions.format)) {
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    auto* const memory = static_cast<std::byte*>(instance.output[stream]);
+    if (memory != nullptr) own.outputs[stream] = memory + places.attributes[stream].offset;
+  }
+  if (isSnormPosition(places[Stream::positions].format)) {
     const BoxScale scale = boxScale(instance.box);
     std::ranges::copy(scale.center, own.boxCenter);
     std::ranges::copy(scale.inverse, own.boxInverse);
@@ -166,7 +155,7 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
   own.mayScale = instance.mayScale;
   own.morphs = instance.morphs;
   float none = 0;  // of an empty list
-  own.output = positions.empty() ? &none : positions.data();
+  own.output[Stream::positions] = positions.empty() ? &none : positions.data();
   Job job;
   job.mesh = &mesh;
   job.method = method;

@@ -30,20 +30,18 @@ struct Scratch {
 struct TaskInstance {
   std::span<const JointMatrix> pose;
   /// Address of each attribute of the mesh's first vertex, indexed by `Stream`.
-  std::array<std::byte*, streamCount> outputs{};
+  ByStream<std::byte*> outputs{};
   bool mayScale = true, restartsMotion = false, settles = false;
   std::span<const MorphWeight> morphs;  ///< in ascending order of targets
   InstanceResult* result = nullptr;
   float boxCenter[3] = {}, boxInverse[3] = {};  ///< for snorm16 positions; `boxInverse` is 1 / half
                                                 ///< the size
-
-  std::byte* output(Stream stream) const { return outputs[static_cast<std::size_t>(stream)]; }
 };
 
 struct Task {
   const MeshData* mesh = nullptr;
   Method method = Method::dualQuaternion;
-  VertexPlaces places;  ///< formats, strides and motion
+  VertexPlaces places;  ///< formats and strides
   std::uint32_t firstVertex = 0, vertexEnd = 0;
   std::span<const TaskInstance> instances;
 };

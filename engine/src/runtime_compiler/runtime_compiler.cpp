@@ -77,10 +77,10 @@ ShaderCompilerOptions compilerOptions(const fs::path& cacheFolder, bool scalarBl
 }  // namespace
 
 struct RuntimeCompiler::State {
-  explicit State(RuntimeCompilerOptions given)
-      : options(std::move(given)),
-        compiler(compilerOptions(options.cacheFolder, false)),
-        scalarCompiler(compilerOptions(options.cacheFolder, true)) {}
+  State(fs::path shaders, const fs::path& cache)
+      : shaderFolder(std::move(shaders)),
+        compiler(compilerOptions(cache, false)),
+        scalarCompiler(compilerOptions(cache, true)) {}
 
   Result<std::vector<std::uint32_t>> get(std::string_view name);
   Result<std::vector<std::uint32_t>> compile(Module& module);
@@ -89,13 +89,13 @@ struct RuntimeCompiler::State {
   Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
                               std::uint64_t completedFrame);
 
-  RuntimeCompilerOptions options;
+  fs::path shaderFolder;
   std::mutex mutex;  ///< guards all members below: a thread may call `prepare` while another one
                      ///< reloads
   ShaderCompiler compiler, scalarCompiler;
   std::map<std::string, Module, std::less<>> modules;
   std::map<fs::path, Stamp> stamps;  ///< of the files of all modules
-  RuntimeCompilerStatistics statistics;
+  std::uint32_t compiledModules = 0, cachedModules = 0;
   std::vector<std::string> cacheProblems;
 };
 
@@ -107,7 +107,7 @@ void RuntimeCompiler::State::watch(const fs::path& path, fs::file_time_type bega
 }
 
 Result<std::vector<std::uint32_t>> RuntimeCompiler::State::compile(Module& module) {
-  const fs::path path = options.shaderFolder / module.recipe->source;
+  const fs::path path = shaderFolder / module.recipe->source;
   const auto began = fs::file_time_type::clock::now();
   ShaderCompiler& used = module.recipe->scalarBlockLayout ? scalarCompiler : compiler;
   Result<std::vector<std::uint32_t>> words = used.compileFile(path, definesOf(*module.recipe));
@@ -122,7 +122,7 @@ Result<std::vector<std::uint32_t>> RuntimeCompiler::State::compile(Module& modul
     error.message += " (module " + std::string(module.recipe->name) + ")";
     return error;
   }
-  ++(used.lastFromCache() ? statistics.fromCache : statistics.compiled);
+  ++(used.lastFromCache() ? cachedModules : compiledModules);
   return words;
 }
 
@@ -134,7 +134,7 @@ Result<std::vector<std::uint32_t>> RuntimeCompiler::State::get(std::string_view 
     return Error{ErrorCode::missingFeature,
                  "this build of Dermis has no kernel '" + std::string(name) + "'"};
   }
-  if (Result<void> good = checkAbi(options.shaderFolder); !good) return good.error();
+  if (Result<void> good = checkAbi(shaderFolder); !good) return good.error();
   Module module;
   module.recipe = recipe;
   Result<std::vector<std::uint32_t>> words = compile(module);
@@ -173,7 +173,7 @@ Result<KernelReload> RuntimeCompiler::State::reload(const vulkan::Context& conte
   // Held until the end, so that a `prepare` that finds the old kernels replaced gets the new ones.
   const std::unique_lock lock(mutex, std::try_to_lock);
   if (!lock || !findStale()) return reload;
-  if (Result<void> good = checkAbi(options.shaderFolder); !good) return good.error();
+  if (Result<void> good = checkAbi(shaderFolder); !good) return good.error();
 
   std::map<Module*, std::vector<std::uint32_t>> compiled;
   for (auto& [name, module] : modules) {
@@ -205,11 +205,11 @@ RuntimeCompiler::~RuntimeCompiler() = default;
 RuntimeCompiler::RuntimeCompiler(RuntimeCompiler&&) noexcept = default;
 RuntimeCompiler& RuntimeCompiler::operator=(RuntimeCompiler&&) noexcept = default;
 
-Result<RuntimeCompiler> RuntimeCompiler::create(RuntimeCompilerOptions options) {
+Result<RuntimeCompiler> RuntimeCompiler::create(fs::path shaderFolder, fs::path cacheFolder) {
   try {
-    if (Result<void> good = checkAbi(options.shaderFolder); !good) return good.error();
+    if (Result<void> good = checkAbi(shaderFolder); !good) return good.error();
     RuntimeCompiler compiler;
-    compiler.state_ = std::make_unique<State>(std::move(options));
+    compiler.state_ = std::make_unique<State>(std::move(shaderFolder), std::move(cacheFolder));
     return compiler;
   } catch (const std::exception& exception) {
     return Error{ErrorCode::ioError, std::string("cannot read kernels: ") + exception.what()};
@@ -237,9 +237,14 @@ Result<KernelReload> RuntimeCompiler::reload(const vulkan::Context& context, std
   }
 }
 
-RuntimeCompilerStatistics RuntimeCompiler::statistics() const {
+std::uint32_t RuntimeCompiler::compiledModules() const {
   const std::lock_guard lock(state_->mutex);
-  return state_->statistics;
+  return state_->compiledModules;
+}
+
+std::uint32_t RuntimeCompiler::cachedModules() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->cachedModules;
 }
 
 std::vector<std::string> RuntimeCompiler::takeCacheProblems() {

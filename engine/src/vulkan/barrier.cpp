@@ -7,9 +7,6 @@
 namespace dermis::vulkan {
 namespace {
 
-constexpr bool includes(Use uses, Use use) {
-  return (static_cast<std::uint32_t>(uses) & static_cast<std::uint32_t>(use)) != 0;
-}
 constexpr Use without(Use uses, Use others) {
   return static_cast<Use>(static_cast<std::uint32_t>(uses) & ~static_cast<std::uint32_t>(others));
 }
@@ -42,6 +39,7 @@ constexpr Row rows[] = {
     {Use::copyWrite, {VK_PIPELINE_STAGE_TRANSFER_BIT, 0, VK_ACCESS_TRANSFER_WRITE_BIT}},
     {Use::hostRead, {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}},
     {Use::hostWrite, {VK_PIPELINE_STAGE_HOST_BIT, 0, VK_ACCESS_HOST_WRITE_BIT}},
+    {Use::indirectRead, {VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, VK_ACCESS_INDIRECT_COMMAND_READ_BIT}},
 };
 
 Side sideOf(Use uses) {

@@ -196,24 +196,23 @@ Bindings& Bindings::operator=(Bindings&&) noexcept = default;
 
 Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   const DeviceLimits& limits = state_->limits;
-  const OutputBuffers& outputs = buffers.outputs;
+  const ByStream<BufferRange>& outputs = buffers.outputs;
   for (const auto& [range, name, mayBeLarger] :
        {std::tuple{&buffers.meshes, "meshes", false},
         {&buffers.poses, "poses", false},
         {&buffers.tables, "tables", false},
         {&buffers.palettes, "palettes", false},
         {&buffers.results, "results", false},
-        {&outputs.positions, "outputs.positions", true},
-        {&outputs.normals, "outputs.normals", true},
-        {&outputs.tangents, "outputs.tangents", true},
-        {&outputs.previousPositions, "outputs.previousPositions", true}}) {
+        {&outputs[Stream::positions], "outputs[positions]", true},
+        {&outputs[Stream::normals], "outputs[normals]", true},
+        {&outputs[Stream::tangents], "outputs[tangents]", true},
+        {&outputs[Stream::previousPositions], "outputs[previousPositions]", true}}) {
     if (Result<void> good = checkRange(*range, name, limits, mayBeLarger); !good)
       return good.error();
   }
   if (state_->bindingCount() != abi::BINDING_COUNT) {
-    for (const BufferRange* range :
-         {&outputs.normals, &outputs.tangents, &outputs.previousPositions}) {
-      if (range->buffer != VK_NULL_HANDLE && !isSame(*range, outputs.positions)) {
+    for (const BufferRange& range : outputs) {
+      if (range.buffer != VK_NULL_HANDLE && !isSame(range, outputs[Stream::positions])) {
         return Error{ErrorCode::limitExceeded,
                      "BatchBuffers::outputs: on a device with " +
                          std::to_string(limits.maxStorageBuffersPerStage) +
@@ -228,15 +227,16 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
   state.context = state.sets.context = state_.get();
   state.buffers = buffers;
   state.bound.resize(bufferRoleCount);
-  for (const auto& [role, range] : {std::pair{BufferRole::meshes, &buffers.meshes},
-                                    {BufferRole::poses, &buffers.poses},
-                                    {BufferRole::tables, &buffers.tables},
-                                    {BufferRole::palettes, &buffers.palettes},
-                                    {BufferRole::results, &buffers.results},
-                                    {BufferRole::positions, &outputs.positions},
-                                    {BufferRole::normals, &outputs.normals},
-                                    {BufferRole::tangents, &outputs.tangents},
-                                    {BufferRole::previousPositions, &outputs.previousPositions}}) {
+  for (const auto& [role, range] :
+       {std::pair{BufferRole::meshes, &buffers.meshes},
+        {BufferRole::poses, &buffers.poses},
+        {BufferRole::tables, &buffers.tables},
+        {BufferRole::palettes, &buffers.palettes},
+        {BufferRole::results, &buffers.results},
+        {BufferRole::positions, &outputs[Stream::positions]},
+        {BufferRole::normals, &outputs[Stream::normals]},
+        {BufferRole::tangents, &outputs[Stream::tangents]},
+        {BufferRole::previousPositions, &outputs[Stream::previousPositions]}}) {
     BoundBuffer& bound = state.bound[static_cast<std::size_t>(role)];
     bound.range = *range;
     if (Result<void> made = createTexelViews(*state.context, role, false, bound); !made)

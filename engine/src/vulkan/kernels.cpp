@@ -34,7 +34,7 @@ static_assert(abi::FORMAT_SNORM8X4 == static_cast<std::uint32_t>(VertexFormat::s
 static_assert(abi::FORMAT_OCTAHEDRAL16X2 ==
               static_cast<std::uint32_t>(VertexFormat::octahedral16x2));
 static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexFormat::octahedral8x2));
-static_assert(static_cast<std::uint32_t>(Motion::none) == 0);  // a boolean of the kernel
+static_assert(static_cast<std::uint32_t>(false) == 0);  // a boolean of the kernel
 // Records are read four words at a time.
 static_assert(sizeof(abi::PaletteRecord) == abi::PALETTE_WORDS * 4);
 static_assert(sizeof(abi::GroupRecord) == abi::GROUP_WORDS * 4 && abi::GROUP_WORDS % 4 == 0);
@@ -113,7 +113,7 @@ std::string moduleName(const Variant& variant) {
   if (isForComparison(variant.method)) name += "_comparison";
   if (isAgainstBulge(variant.method)) name += "_bulge";
   if (variant.oneOutput) return name + "_one_output";
-  if (variant.motion != Motion::none || hasResults(variant)) name += "_extras";
+  if (variant.motion || hasResults(variant)) name += "_extras";
   if (variant.staged) return name + "_staged";
   if (variant.texels) return name + "_texels";
   return name;
@@ -136,7 +136,7 @@ std::string pipelineName(const Variant& variant) {
     text += ", normals as " + std::string(formatName(variant.normals));
   if (variant.tangents != VertexFormat::none)
     text += ", tangents as " + std::string(formatName(variant.tangents));
-  if (variant.motion != Motion::none) text += ", previous positions";
+  if (variant.motion) text += ", previous positions";
   if (variant.morphs) text += ", morph targets";
   if (variant.bounds) text += ", bounds";
   if (variant.recordBytes != 0)

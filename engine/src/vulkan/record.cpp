@@ -38,17 +38,14 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
        {BufferRole::normals, "normals"},
        {BufferRole::tangents, "tangents"},
        {BufferRole::previousPositions, "previous positions"}}};
-  const OutputBuffers& given = buffers.outputs;
-  const std::array<const BufferRange*, streamCount> ranges{
-      &given.positions, &given.normals, &given.tangents, &given.previousPositions};
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     const bool isWritten = std::ranges::any_of(plan.pipelines(), [&](PipelineId id) {
       const Variant variant = variantOf(id);
       return variant.kernel == Kernel::skin && writesStream(variant, stream);
     });
     if (!isWritten) continue;
-    if (Result<void> good =
-            checkBuffer(plan, outputs[stream].first, *ranges[stream], outputs[stream].second);
+    if (Result<void> good = checkBuffer(plan, outputs[stream].first, buffers.outputs[stream],
+                                        outputs[stream].second);
         !good)
       return good;
   }
@@ -57,7 +54,7 @@ Result<void> BindingsState::checkBuffers(const Plan& plan) const {
 
 /// Variants that store attributes together write them through the binding of one of them.
 Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
-  const BufferRange& positions = buffers.outputs.positions;
+  const BufferRange& positions = buffers.outputs[Stream::positions];
   for (const PipelineId id : plan.pipelines()) {
     const Variant variant = variantOf(id);
     if (variant.kernel != Kernel::skin ||
@@ -65,8 +62,8 @@ Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
           shareWords(variant.positions, variant.normals, variant.tangents)))
       continue;
     for (const auto& [format, range, name] :
-         {std::tuple{variant.normals, &buffers.outputs.normals, "normals"},
-          {variant.tangents, &buffers.outputs.tangents, "tangents"}}) {
+         {std::tuple{variant.normals, &buffers.outputs[Stream::normals], "normals"},
+          {variant.tangents, &buffers.outputs[Stream::tangents], "tangents"}}) {
       if (format == VertexFormat::none ||
           (range->buffer == positions.buffer && range->offset == positions.offset))
         continue;
@@ -109,32 +106,6 @@ Result<void> ContextState::check(const Plan& plan, const BoundBuffers& buffers,
 
 namespace {
 
-struct Scope {
-  VkPipelineStageFlags stages = 0;
-  VkAccessFlags accesses = 0;
-};
-Scope scopeOf(Access accesses) {
-  struct Part {
-    Access access;
-    Scope scope;
-  };
-  static constexpr std::array<Part, 6> parts{
-      {{Access::computeRead, {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT}},
-       {Access::computeWrite, {VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT}},
-       {Access::copyRead, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT}},
-       {Access::copyWrite, {VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT}},
-       {Access::indirectRead,
-        {VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, VK_ACCESS_INDIRECT_COMMAND_READ_BIT}},
-       {Access::hostRead, {VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT}}}};
-  Scope scope;
-  for (const Part& part : parts) {
-    if (!includes(accesses, part.access)) continue;
-    scope.stages |= part.scope.stages;
-    scope.accesses |= part.scope.accesses;
-  }
-  return scope;
-}
-
 /// Records one command after the other.
 class Recorder {
  public:
@@ -148,11 +119,7 @@ class Recorder {
         staging_(staging) {}
 
   void operator()(const BarrierCommand& barrier) {
-    const Scope before = scopeOf(barrier.before), after = scopeOf(barrier.after);
-    // After reads alone, no memory has to be made visible.
-    constexpr VkAccessFlags writes = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
-    context_.recordBarrier(commandBuffer_,
-                           {before.stages, before.accesses & writes, after.stages, after.accesses});
+    context_.recordBarrier(commandBuffer_, barrierBetween(barrier.before, barrier.after));
   }
 
   void operator()(const ClearCommand& clear) {

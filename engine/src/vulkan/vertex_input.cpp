@@ -30,10 +30,11 @@ VkFormat vertexInputFormat(VertexFormat format) {
   return VK_FORMAT_UNDEFINED;
 }
 
-Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNumbers& numbers) {
+Result<VertexInput> vertexInput(const VertexLayout& layout,
+                                const ByStream<std::uint32_t>& locations,
+                                std::uint32_t firstBinding) {
   const Result<VertexPlaces> places = placeVertices(layout, 1);
   if (!places) return places.error();
-  const bool isInterleaved = layout.arrangement == Arrangement::interleaved;
   VertexInput input;
   const auto add = [&](const OutputAttribute& attribute, std::uint32_t location) -> Result<void> {
     if (attribute.format == VertexFormat::none) return {};
@@ -51,22 +52,19 @@ Result<VertexInput> vertexInput(const VertexLayout& layout, const VertexInputNum
                        std::to_string(formatAlignment(attribute.format)) +
                        ", the size of a component of " + name};
     }
-    if (!isInterleaved || input.bindingCount == 0) {
-      input.bindings[input.bindingCount] = {numbers.firstBinding + input.bindingCount,
-                                            attribute.stride, VK_VERTEX_INPUT_RATE_VERTEX};
+    if (layout.planar || input.bindingCount == 0) {
+      input.bindings[input.bindingCount] = {firstBinding + input.bindingCount, attribute.stride,
+                                            VK_VERTEX_INPUT_RATE_VERTEX};
       ++input.bindingCount;
     }
     const std::uint32_t binding = input.bindings[input.bindingCount - 1].binding;
-    const auto offset = isInterleaved ? static_cast<std::uint32_t>(attribute.offset) : 0;
+    const auto offset = layout.planar ? 0 : static_cast<std::uint32_t>(attribute.offset);
     input.attributes[input.attributeCount++] = {location, binding, format, offset};
     return {};
   };
-  for (const auto& [attribute, location] :
-       {std::pair{places->positions, numbers.positions},
-        {places->normals, numbers.normals},
-        {places->tangents, numbers.tangents},
-        {places->previousPositions, numbers.previousPositions}}) {
-    if (Result<void> added = add(attribute, location); !added) return added.error();
+  for (std::size_t stream = 0; stream < streamCount; ++stream) {
+    if (Result<void> added = add(places->attributes[stream], locations[stream]); !added)
+      return added.error();
   }
   return input;
 }

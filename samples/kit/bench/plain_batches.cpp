@@ -199,7 +199,7 @@ Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer co
                                        4, &jointTotal);
   device_.functions().CmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
   recordBarrier(device_, commandBuffer,
-                vulkan::barrierBetween(vulkan::Use::computeWrite, vulkan::Use::computeRead));
+                vulkan::barrierBetween(Use::computeWrite, Use::computeRead));
   return {};
 }
 
@@ -242,8 +242,7 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
     return begun;
   // After the previous execution.
   recordBarrier(device_, commandBuffer,
-                vulkan::barrierBetween(vulkan::Use::computeWrite,
-                                       vulkan::Use::computeWrite | vulkan::Use::computeRead));
+                vulkan::barrierBetween(Use::computeWrite, Use::computeWrite | Use::computeRead));
   timestamps_.recordBegin(commandBuffer);
   if (kernel == PlainKernel::dualQuaternion) {
     if (Result<void> recorded = recordPalettes(crowd, commandBuffer); !recorded) return recorded;

@@ -61,7 +61,7 @@ std::vector<Case> formatCases() {
   bounds.bounds = true;
   add("float32x3/bounds", bounds);
   OutputLayout kept;
-  kept.motion = Motion::kept;
+  kept.motion = true;
   add("float32x3/previous_positions", kept);
   return cases;
 }
@@ -210,8 +210,8 @@ class CpuCrowd {
       for (std::uint32_t i = 0; i < count; ++i) {
         instances[i].pose = crowd_->poses[begin + i];
         instances[i].mayScale = false;
-        instances[i].output =
-            reinterpret_cast<std::byte*>(output_.data()) + places_.size * (begin + i);
+        instances[i].output.fill(reinterpret_cast<std::byte*>(output_.data()) +
+                                 places_.size * (begin + i));
       }
       job.instances = std::span(instances).first(count);
       if (Result<void> skinned = cpu::skin(job); !skinned) return skinned;
@@ -310,7 +310,7 @@ class Rows : public Throughput {
     const Box box = boxOf(*plainOutput);
     // The first one determines the size of the output.
     std::ranges::stable_sort(cases, std::greater<>(), [](const Case& one) {
-      return std::pair(one.layout.motion != Motion::none, one.instances);
+      return std::pair(one.layout.motion, one.instances);
     });
     for (const Case& one : cases) {
       std::vector<SkinRequest> requests = crowd.requests(one.method, one.instances);

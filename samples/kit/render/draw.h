@@ -64,7 +64,7 @@ struct Surface {
 
 struct Draw {
   /// float32x3, float32x4 or float16x4. The caller must record the barrier between the writes and
-  /// the draw, `barrierBetween(Use::dermis, Use::vertexInput)`.
+  /// the draw, `vulkan::barrierBetween(Use::dermis, Use::vertexInput)`.
   VertexStream positions;
   /// Any format that `isNormalFormat` allows, except three components of 1 or 2 bytes; or none, for
   /// flat shading.

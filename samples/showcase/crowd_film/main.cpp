@@ -103,11 +103,9 @@ class SkinnedCrowd {
         std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
       }
     }
-    context_->recordBarrier(commandBuffer,
-                            vulkan::barrierBetween(vulkan::Use::vertexInput, vulkan::Use::dermis));
+    context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::vertexInput, Use::dermis));
     must(recorder_.record(commandBuffer));
-    context_->recordBarrier(commandBuffer,
-                            vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::vertexInput));
+    context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput));
   }
 
   /// The figures in the picture. Near ones are first, so that hidden ones are not shaded.
@@ -128,8 +126,9 @@ class SkinnedCrowd {
       return {recorder_.outputBuffer(), attribute.offset, attribute.stride, attribute.format};
     };
     render::Draw draw;
-    draw.positions = stream(output.positions);
-    if (output.normals.format != VertexFormat::none) draw.normals = stream(output.normals);
+    draw.positions = stream(output.places[Stream::positions]);
+    if (output.places[Stream::normals].format != VertexFormat::none)
+      draw.normals = stream(output.places[Stream::normals]);
     draw.transform = figures_[figure].now.place;
     return draw;
   }

@@ -91,7 +91,7 @@ ExitStatus run(int argc, char** argv) {
 #ifdef DERMIS_RUNTIME_COMPILER
   std::optional<RuntimeCompiler> compiler;
   if (!options.shaders.empty()) {
-    Result<RuntimeCompiler> made = RuntimeCompiler::create({samples::pathOf(options.shaders), {}});
+    Result<RuntimeCompiler> made = RuntimeCompiler::create(samples::pathOf(options.shaders));
     if (!made) return samples::reportDeviceError(made.error());
     options.viewer.compiler = &compiler.emplace(std::move(*made));
     options.device.kernels = compiler->source();

@@ -12,6 +12,7 @@
 
 #include <vulkan/vk_platform.h>
 
+#include "dermis/layout.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 
@@ -64,32 +65,6 @@ inline constexpr VkBufferUsageFlags vertexBufferUsage =
 //   context.record(commandBuffer, plan, bindings);  // or SceneRecorder::record
 //   context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
 
-/// How commands use a buffer. Combine uses by `|`.
-enum class Use : std::uint32_t {
-  /// All that `record` reads and writes. A SceneRecorder orders its own `record`s; between two
-  /// calls of `Context::record` with the same buffers, the engine records a barrier.
-  dermis = 1,
-  vertexInput = 2,   ///< draws, as a vertex buffer
-  vertexShader = 4,  ///< this and the next four: as a storage or texel buffer that is only read
-  fragmentShader = 8,
-  taskShader = 16,  ///< of VK_EXT_mesh_shader
-  meshShader = 32,
-  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline
-  accelerationStructureBuild = 128,  ///< the geometry of a build or refit
-  computeRead = 256,                 ///< by compute shaders of the engine
-  computeWrite = 512,
-  copyRead = 1024,   ///< vkCmdCopyBuffer
-  copyWrite = 2048,  ///< vkCmdCopyBuffer, vkCmdUpdateBuffer, vkCmdFillBuffer
-  hostRead = 4096,   ///< through a mapping, after a fence
-  /// Through a mapping. What is written before the submission needs no barrier: vkQueueSubmit makes
-  /// it visible.
-  hostWrite = 8192,
-};
-/// Both uses.
-constexpr Use operator|(Use a, Use b) {
-  return static_cast<Use>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
-}
-
 /// Which half of a queue-family ownership transfer a barrier is. A transfer needs two barriers with
 /// the same uses: the release on the queue of the first, and the acquire on the queue of the
 /// second. Vulkan ignores the destination of a release and the source of an acquire (Vulkan 1.3,
@@ -133,18 +108,6 @@ struct BufferRange {
   VkDeviceSize size = 0;  ///< bytes; a multiple of 4, not VK_WHOLE_SIZE
 };
 
-/// The output buffer of each attribute. Attributes may share a buffer. Each may be larger than a
-/// storage buffer range.
-struct OutputBuffers {
-  BufferRange positions;
-  BufferRange normals;
-  BufferRange tangents;
-  BufferRange previousPositions;
-
-  /// For one buffer that all attributes share.
-  static OutputBuffers oneBuffer(const BufferRange& range) { return {range, range, range, range}; }
-};
-
 /// The buffers of a batch. The engine owns them. `Plan::buffer` returns their sizes and usage: each
 /// has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT. If `DeviceLimits::texelBuffers` is set, meshes, poses,
 /// tables and palettes have VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT, too; an engine that cannot
@@ -158,7 +121,9 @@ struct BatchBuffers {
   BufferRange poses;     ///< joint matrices at `PoseDescription::matrixOffset`
   BufferRange tables;    ///< what `writeTables` wrote
   BufferRange palettes;  ///< palettes and `PoseStatus`, which the palette kernel writes
-  OutputBuffers outputs;
+  /// The output buffer of each attribute: `all(range)` if they share one. Each may be larger than a
+  /// storage buffer range.
+  ByStream<BufferRange> outputs{};
   BufferRange results;  ///< `InstanceResult` at `Plan::resultOffset`
 };
 

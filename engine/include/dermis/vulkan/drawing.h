@@ -25,15 +25,6 @@ namespace dermis::vulkan {
 /// The shader must decode snorm16x4 positions and octahedral directions (dermis_decode.glsl).
 DERMIS_VULKAN_API VkFormat vertexInputFormat(VertexFormat format);
 
-/// Locations and bindings that the engine's shaders and pipelines use.
-struct VertexInputNumbers {
-  std::uint32_t positions = 0;          ///< location of the positions
-  std::uint32_t normals = 1;            ///< location of the normals
-  std::uint32_t tangents = 2;           ///< location of the tangents
-  std::uint32_t previousPositions = 3;  ///< location of the previous positions
-  std::uint32_t firstBinding = 0;       ///< number of the first binding
-};
-
 /// For VkPipelineVertexInputStateCreateInfo. An interleaved layout has one binding: bind the output
 /// buffer at `InstanceOutput::offset`, or at 0 for draws with `IndexedDraw::vertexOffset`. A planar
 /// layout has one binding for each attribute, in the order positions, normals, tangents, previous
@@ -45,11 +36,13 @@ struct VertexInput {
   std::uint32_t attributeCount = 0;  ///< elements of `attributes` that are used
 };
 
-/// The vertex input of a layout. Fails with `invalidArgument` as `placeVertices` does, if
-/// `vertexInputFormat` returns VK_FORMAT_UNDEFINED for an attribute, and if the stride of the
-/// layout is not a multiple of the size of an attribute's component.
-DERMIS_VULKAN_API Result<VertexInput> vertexInput(const VertexLayout& layout,
-                                                  const VertexInputNumbers& numbers = {});
+/// The vertex input of a layout. `locations` are those of the attributes in the engine's shader,
+/// `firstBinding` is the number of the first binding. Fails with `invalidArgument` as
+/// `placeVertices` does, if `vertexInputFormat` returns VK_FORMAT_UNDEFINED for an attribute, and
+/// if the stride of the layout is not a multiple of the size of an attribute's component.
+DERMIS_VULKAN_API Result<VertexInput> vertexInput(
+    const VertexLayout& layout, const ByStream<std::uint32_t>& locations = {{0, 1, 2, 3}},
+    std::uint32_t firstBinding = 0);
 
 // ---- Skinned positions as the geometry of a bottom-level acceleration structure, for ray tracing
 // (VK_KHR_acceleration_structure). The functions fill structures and call no Vulkan function: the
@@ -93,8 +86,7 @@ DERMIS_VULKAN_API VkFormat buildInputFormat(VertexFormat positions);
 /// triangle) and no transform. The engine sets its indices, and for snorm16x4 the transform of
 /// `boxTransform`.
 ///
-/// - `positions`: `Job::positions`, or `Job::previousPositions` with the format of `positions`. Or
-///   those of `InstanceOutput`.
+/// - `positions`: positions or previous positions of `Job::places` or `InstanceOutput::places`.
 /// - `vertexCount`: `MeshInfo::vertexCount`.
 /// - `outputAddress`: the device address from which the offset of `positions` counts. For a `Job`:
 ///   vkGetBufferDeviceAddress of the output buffer, plus `BufferRange::offset`. For an

@@ -110,7 +110,7 @@ struct FrameDescription {
   /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
   /// holds `Scene::visibilityCount` words of 4 bytes. An instance is visible if the word at its
   /// `visibilityIndex` is not 0. The engine's culling writes them on the GPU before `record`, with
-  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between (barrier.h).
+  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between.
   VkBuffer visibility{};
   /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
   VkDeviceSize visibilityOffset = 0;
@@ -179,7 +179,7 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// nothing if nothing changed and no instance is culled on the GPU. Call it once after each
   /// `beginFrame`, outside a render pass, with a primary or secondary command buffer. Before it the
   /// engine records the barrier between the last use of the output and `Use::dermis`, and after it
-  /// the barrier between `Use::dermis` and the next use (barrier.h).
+  /// the barrier between `Use::dermis` and the next use.
   ///
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;

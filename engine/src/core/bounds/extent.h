@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "dermis/mesh.h"
+#include "bounds/joint_bounds_data.h"
 #include "linear_algebra.h"
 
 namespace dermis::bounds {

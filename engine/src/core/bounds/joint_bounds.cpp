@@ -157,11 +157,11 @@ class Collector {
         addPair(influences[first], influences[second], influences.size(), reach);
       }
     }
-    if (influences.size() <= JointBounds::maxTrioInfluences) addTrios(influences);
+    if (influences.size() <= JointBoundsData::maxTrioInfluences) addTrios(influences);
   }
 
-  JointBounds take() const {
-    JointBounds result;
+  JointBoundsData take() const {
+    JointBoundsData result;
     std::vector<std::uint32_t> compact(alone_.size(), 0);
     for (std::uint32_t joint = 0; joint < alone_.size(); ++joint) {
       if (!used_[joint]) continue;
@@ -175,7 +175,7 @@ class Collector {
       result.pairs.push_back(finish(compact[key >> 16], compact[key & 0xffffu], pair));
     }
     std::sort(result.pairs.begin(), result.pairs.end(),
-              [](const JointBounds::Pair& a, const JointBounds::Pair& b) {
+              [](const JointBoundsData::Pair& a, const JointBoundsData::Pair& b) {
                 return a.first != b.first ? a.first < b.first : a.second < b.second;
               });
     for (const std::uint64_t key : trios_) {
@@ -215,8 +215,8 @@ class Collector {
     }
   }
 
-  static JointBounds::Pair finish(std::uint32_t first, std::uint32_t second,
-                                  const PairRange& pair) {
+  static JointBoundsData::Pair finish(std::uint32_t first, std::uint32_t second,
+                                      const PairRange& pair) {
     return {first,
             second,
             pair.influences,
@@ -272,7 +272,7 @@ Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
     gatherInfluences(mesh, vertex, influences);
     collector.add(influences, displacements.around(vertex, loadPosition(mesh, vertex)));
   }
-  return collector.take();
+  return JointBoundsData::joined(collector.take());
 }
 
 }  // namespace dermis

@@ -228,7 +228,7 @@ struct Blend {
 
 class PoseBounds {
  public:
-  PoseBounds(const JointBounds& bounds, const Blend& blend, std::pmr::memory_resource* memory)
+  PoseBounds(const JointBoundsData& bounds, const Blend& blend, std::pmr::memory_resource* memory)
       : bounds_(bounds),
         method_(blend.method),
         exactJoints_(!blend.decomposed),
@@ -240,7 +240,7 @@ class PoseBounds {
     if (method_ == Method::dualQuaternion) findSplitJoints();
     addAmbiguousJoints();
     addJoints();
-    for (const JointBounds::Pair& pair : bounds_.pairs) {
+    for (const JointBoundsData::Pair& pair : bounds_.pairs) {
       if (method_ == Method::linear) {
         addLinearPair(pair);
       } else {
@@ -259,7 +259,7 @@ class PoseBounds {
   /// so large that float32 cannot hold the sums of an extent: from here on no number is NaN.
   bool pose(std::span<const JointMatrix> palette) {
     joints_.reserve(bounds_.joints.size());
-    for (const JointBounds::Joint& used : bounds_.joints) {
+    for (const JointBoundsData::Joint& used : bounds_.joints) {
       if (used.joint >= palette.size() || !isFinite(palette[used.joint])) return false;
       Posed& joint = joints_.emplace_back();
       joint.map = affineOf(palette[used.joint]);
@@ -278,10 +278,10 @@ class PoseBounds {
       }
       furthest_ = std::max(furthest_, math::length(joint.map.offset));
     }
-    for (const JointBounds::Joint& used : bounds_.joints) {
+    for (const JointBoundsData::Joint& used : bounds_.joints) {
       if (!used.alone.empty()) bind_.add(bounds::rangeOf(used.alone));
     }
-    for (const JointBounds::Pair& pair : bounds_.pairs) bind_.add(bounds::rangeOf(pair.extent));
+    for (const JointBoundsData::Pair& pair : bounds_.pairs) bind_.add(bounds::rangeOf(pair.extent));
     return bind_.empty() || bounds::reachOf(bind_) <= 1e38;
   }
 
@@ -292,8 +292,8 @@ class PoseBounds {
     for (const auto& [a, b, c] : bounds_.trios) {
       splitIfTorn(joints_[a], joints_[b], joints_[c]);
     }
-    for (const JointBounds::Pair& pair : bounds_.pairs) {
-      if (pair.influences <= JointBounds::maxTrioInfluences) continue;
+    for (const JointBoundsData::Pair& pair : bounds_.pairs) {
+      if (pair.influences <= JointBoundsData::maxTrioInfluences) continue;
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
       const double cosine = std::abs(math::dot(first.parts.real, second.parts.real));
       for (Posed* joint : {&first, &second}) {
@@ -322,7 +322,7 @@ class PoseBounds {
   /// any rotation.
   void addAmbiguousJoints() {
     if (!anyAmbiguous_) return;
-    for (const JointBounds::Pair& pair : bounds_.pairs) {
+    for (const JointBoundsData::Pair& pair : bounds_.pairs) {
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
       const double distance = math::length(first.map.offset - second.map.offset);
       for (Posed* joint : {&first, &second}) {
@@ -354,7 +354,7 @@ class PoseBounds {
   struct Share {
     double least, greatest;
   };
-  static Share shareOf(const JointBounds::Pair& pair, double cosine) {
+  static Share shareOf(const JointBoundsData::Pair& pair, double cosine) {
     const auto share = [&](double a, double b) { return (a + cosine) / (a + b + 2 * cosine); };
     return {share(static_cast<double>(pair.firstOverSecond[0]),
                   static_cast<double>(pair.secondOverFirst[1])),
@@ -362,7 +362,7 @@ class PoseBounds {
                   static_cast<double>(pair.secondOverFirst[0]))};
   }
 
-  void addLinearPair(const JointBounds::Pair& pair) {
+  void addLinearPair(const JointBoundsData::Pair& pair) {
     if (joints_[pair.first].parts.ambiguous || joints_[pair.second].parts.ambiguous) return;
     const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
     const Share share = shareOf(pair, 1);
@@ -370,7 +370,7 @@ class PoseBounds {
     box_.add(bounds::imageOf(second + share.greatest * difference, pair.extent));
   }
 
-  void addDualQuaternionPair(const JointBounds::Pair& pair) {
+  void addDualQuaternionPair(const JointBoundsData::Pair& pair) {
     const Posed &first = joints_[pair.first], &second = joints_[pair.second];
     if (first.parts.ambiguous || second.parts.ambiguous) return;
     const Turn turn = turnBetween(first, second);
@@ -409,7 +409,7 @@ class PoseBounds {
     return bounds::reachOf(bounds::imageOf(difference, extent));
   }
 
-  double ballFactor(const JointBounds::Pair& pair, double cosine) {
+  double ballFactor(const JointBoundsData::Pair& pair, double cosine) {
     const double others = pair.influences - 1;
     const double factor = 1 / (1 / others + std::max(0.0, cosine - ambiguousCosine));
     amplification_ = std::max(amplification_, factor);
@@ -437,7 +437,7 @@ class PoseBounds {
     return exactJoints_ ? exactly : amplified * (exactly + 1e-5 * reach);
   }
 
-  const JointBounds& bounds_;
+  const JointBoundsData& bounds_;
   Method method_;
   bool exactJoints_, ignoresScale_;
   std::pmr::vector<Posed> joints_;
@@ -448,7 +448,8 @@ class PoseBounds {
   bool anyAmbiguous_ = false;
 };
 
-Box boundsBy(const JointBounds& bounds, std::span<const JointMatrix> palette, const Blend& blend) {
+Box boundsBy(const JointBoundsData& bounds, std::span<const JointMatrix> palette,
+             const Blend& blend) {
   // Room for the joints of nearly all rigs; what does not fit comes from the heap.
   alignas(Posed) std::array<std::byte, 128 * sizeof(Posed)> room;
   std::pmr::monotonic_buffer_resource memory(room.data(), room.size());
@@ -457,8 +458,9 @@ Box boundsBy(const JointBounds& bounds, std::span<const JointMatrix> palette, co
 
 }  // namespace
 
-Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> palette, Method method,
-                  bool mayScale) {
+Box skinnedBounds(const JointBounds& jointBounds, std::span<const JointMatrix> palette,
+                  Method method, bool mayScale) {
+  const JointBoundsData& bounds = JointBoundsData::of(jointBounds);
   switch (method) {
     case Method::linear:
       return boundsBy(bounds, palette, {Method::linear, false, mayScale});

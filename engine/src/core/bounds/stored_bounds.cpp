@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds/joint_bounds_data.h"
 #include "dermis/mesh.h"
 #include "pack/check.h"
 #include "strict_floating_point.h"
@@ -28,11 +29,11 @@ struct Header {
   Box unweighted;
 };
 
-static_assert(sizeof(JointBounds::Joint) == 27 * 4 && sizeof(JointBounds::Pair) == 34 * 4);
+static_assert(sizeof(JointBoundsData::Joint) == 27 * 4 && sizeof(JointBoundsData::Pair) == 34 * 4);
 
 constexpr std::uint64_t wordsOf(std::uint64_t joints, std::uint64_t pairs, std::uint64_t trios) {
-  return sizeof(Header) / 4 + joints * sizeof(JointBounds::Joint) / 4 +
-         pairs * sizeof(JointBounds::Pair) / 4 + trios * 3;
+  return sizeof(Header) / 4 + joints * sizeof(JointBoundsData::Joint) / 4 +
+         pairs * sizeof(JointBoundsData::Pair) / 4 + trios * 3;
 }
 
 Error damaged(const std::string& what) {
@@ -59,9 +60,9 @@ void take(std::span<const std::byte>& bytes, std::size_t count, std::vector<Elem
   bytes = bytes.subspan(size);
 }
 
-Result<void> checkJoints(const JointBounds& bounds) {
+Result<void> checkJoints(const JointBoundsData& bounds) {
   std::uint32_t required = 0;
-  for (const JointBounds::Joint& joint : bounds.joints) {
+  for (const JointBoundsData::Joint& joint : bounds.joints) {
     if (joint.joint < required || joint.joint >= maxPoseJoints || hasNan(joint.alone.reach))
       return damaged("its joints are not in ascending order, or contain NaN");
     required = joint.joint + 1;
@@ -73,9 +74,9 @@ Result<void> checkJoints(const JointBounds& bounds) {
   return {};
 }
 
-Result<void> checkPairs(const JointBounds& bounds) {
+Result<void> checkPairs(const JointBoundsData& bounds) {
   std::uint64_t next = 0;
-  for (const JointBounds::Pair& pair : bounds.pairs) {
+  for (const JointBoundsData::Pair& pair : bounds.pairs) {
     const std::uint64_t key = std::uint64_t{pair.first} << 32 | pair.second;
     const float ratios[] = {pair.firstOverSecond[0], pair.firstOverSecond[1],
                             pair.secondOverFirst[0], pair.secondOverFirst[1], pair.minSum};
@@ -89,7 +90,7 @@ Result<void> checkPairs(const JointBounds& bounds) {
   return {};
 }
 
-Result<void> checkTrios(const JointBounds& bounds) {
+Result<void> checkTrios(const JointBoundsData& bounds) {
   const std::array<std::uint32_t, 3>* before = nullptr;
   for (const std::array<std::uint32_t, 3>& trio : bounds.trios) {
     if (trio[0] >= trio[1] || trio[1] >= trio[2] || trio[2] >= bounds.joints.size() ||
@@ -102,7 +103,7 @@ Result<void> checkTrios(const JointBounds& bounds) {
 
 }  // namespace
 
-std::vector<std::byte> JointBounds::bytes() const {
+std::vector<std::byte> JointBoundsData::bytes() const {
   static_assert(std::endian::native == std::endian::little, "the words are little-endian");
   const std::uint64_t words = wordsOf(joints.size(), pairs.size(), trios.size());
   std::vector<std::byte> bytes(static_cast<std::size_t>(4 * words));
@@ -127,7 +128,7 @@ std::vector<std::byte> JointBounds::bytes() const {
   return bytes;
 }
 
-Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
+Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> bytes) {
   Header header{};
   if (bytes.size() >= sizeof(header)) std::memcpy(&header, bytes.data(), sizeof(header));
   if (header.magic != magic)
@@ -146,7 +147,7 @@ Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
   std::memcpy(words.data(), bytes.data(), bytes.size());
   if (checksumOfBlob(words) != header.checksum) return damaged("the checksum does not match");
 
-  JointBounds bounds;
+  JointBoundsData bounds;
   bytes = bytes.subspan(sizeof(header));
   take(bytes, header.joints, bounds.joints);
   take(bytes, header.pairs, bounds.pairs);
@@ -159,6 +160,31 @@ Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
   if (Result<void> good = checkPairs(bounds); !good) return good.error();
   if (Result<void> good = checkTrios(bounds); !good) return good.error();
   return bounds;
+}
+
+JointBounds::JointBounds() : data_(std::make_unique<JointBoundsData>()) {}
+JointBounds::~JointBounds() = default;
+JointBounds::JointBounds(JointBounds&&) noexcept = default;
+JointBounds& JointBounds::operator=(JointBounds&&) noexcept = default;
+
+JointBounds JointBoundsData::joined(JointBoundsData data) {
+  JointBounds bounds;
+  *bounds.data_ = std::move(data);
+  return bounds;
+}
+
+const JointBoundsData& JointBoundsData::of(const JointBounds& bounds) {
+  return *bounds.data_;
+}
+
+std::vector<std::byte> JointBounds::bytes() const {
+  return JointBoundsData::of(*this).bytes();
+}
+
+Result<JointBounds> JointBounds::fromBytes(std::span<const std::byte> bytes) {
+  Result<JointBoundsData> data = JointBoundsData::fromBytes(bytes);
+  if (!data) return data.error();
+  return JointBoundsData::joined(*std::move(data));
 }
 
 }  // namespace dermis

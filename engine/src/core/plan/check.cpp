@@ -24,7 +24,7 @@ Error wrongFormat(VertexFormat format, const char* name, const Subject& subject)
 
 Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStreams& streams,
                           const Subject& subject) {
-  const std::array<std::uint64_t, streamCount> sizes = outputSizes(batch.outputs);
+  const ByStream<std::uint64_t>& sizes = batch.outputSizes;
   for (std::size_t index = 0; index < streamCount; ++index) {
     const OutputStream& stream = streams[index];
     if (stream.size == 0) continue;
@@ -48,15 +48,16 @@ Result<void> checkTogether(const Batch& batch, const Job& job, const OutputStrea
                            const Subject& subject) {
   const auto name = [&] {
     return subject.name() + ": its attributes are adjacent, with a stride of " +
-           std::to_string(job.positions.stride);
+           std::to_string(job.places[Stream::positions].stride);
   };
-  if (!batch.outputs.isOneBuffer &&
+  if (!batch.isOneOutput &&
       (standsTogether(streams) || standsInPairs(job) ||
-       shareWords(job.positions.format, job.normals.format, job.tangents.format)))
-    return invalid(name() + ": all attributes must go to one buffer (OutputSizes::isOneBuffer)");
-  if (job.positions.offset % 8 != 0 && standsInPairs(job)) {
+       shareWords(job.places[Stream::positions].format, job.places[Stream::normals].format,
+                  job.places[Stream::tangents].format)))
+    return invalid(name() + ": all attributes must go to one buffer (Batch::isOneOutput)");
+  if (job.places[Stream::positions].offset % 8 != 0 && standsInPairs(job)) {
     return invalid(name() + ": positions must begin at a multiple of 8, not at " +
-                   std::to_string(job.positions.offset));
+                   std::to_string(job.places[Stream::positions].offset));
   }
   return {};
 }
@@ -135,14 +136,9 @@ Result<void> checkPoseOf(const Batch& batch, const Job& job, const Subject& subj
   return {};
 }
 
-Result<void> checkMotion(Motion motion, const Subject& subject) {
-  if (motion <= Motion::kept) return {};
-  return notAValue(subject.name() + ": its motion", motion, "Motion");
-}
-
 Result<void> checkMotion(const Job& job, const Subject& subject) {
-  if (Result<void> good = checkMotion(job.motion, subject); !good) return good;
-  if (job.motion == Motion::none && (job.settles || job.restartsMotion)) {
+  if (Result<void> good = checkPrevious(job.places, subject); !good) return good;
+  if (!job.places.hasMotion() && (job.settles || job.restartsMotion)) {
     return invalid(subject.name() +
                    " settles or restarts its motion, but has no previous positions");
   }
@@ -188,12 +184,22 @@ Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFo
   return {};
 }
 
+Result<void> checkPrevious(const VertexPlaces& places, const Subject& subject) {
+  const VertexFormat positions = places[Stream::positions].format;
+  const VertexFormat previous = places[Stream::previousPositions].format;
+  if (previous == positions || previous == VertexFormat::none) return {};
+  if (previous > allVertexFormats.back())
+    return wrongFormat(previous, "previous positions", subject);
+  return invalid(subject.name() + ": its previous positions are " +
+                 std::string(formatName(previous)) + ", but its positions " +
+                 std::string(formatName(positions)));
+}
+
 Result<void> checkVariant(const Variant& variant) {
   constexpr Subject subject{"the variant"};
   if (variant.kernel > Kernel::clear)
     return notAValue("the variant: its kernel", variant.kernel, "Kernel");
   if (Result<void> good = checkMethod(variant.method, subject); !good) return good;
-  if (Result<void> good = checkMotion(variant.motion, subject); !good) return good;
   if (Result<void> good =
           checkFormats(variant.positions, variant.normals, variant.tangents, subject);
       !good)
@@ -219,7 +225,7 @@ Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
   const Result<VertexPlaces> places = placeVertices(needs.layout, 1);
   if (!places) return places;
   Job job;
-  job.place(*places);
+  job.places = *places;
   if (Result<void> good = checkRuns(job, outputStreams(job), {"the layout"}); !good)
     return good.error();
   return places;
@@ -262,8 +268,9 @@ Error wrongRun(const Job& job, const AttributeRun& run, const OutputStream& firs
                    std::to_string(first.stride) + " of its " + streamName(run.first) +
                    " must be multiples of 4");
   }
-  const std::array formats{job.positions.format, job.normals.format, job.tangents.format,
-                           job.positions.format};
+  const std::array formats{job.places[Stream::positions].format, job.places[Stream::normals].format,
+                           job.places[Stream::tangents].format,
+                           job.places[Stream::positions].format};
   return invalid(subject.name() + ": its " + streamName(run.part) + " as " +
                  std::string(formatName(formats[run.part])) + " are in a run of " +
                  std::to_string(run.length) + " bytes, which is not a multiple of 4; use " +
@@ -316,19 +323,20 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
                    " needs centers of rotation, but its mesh has none");
   }
   if (Result<void> good =
-          checkFormats(job.positions.format, job.normals.format, job.tangents.format, subject);
+          checkFormats(job.places[Stream::positions].format, job.places[Stream::normals].format,
+                       job.places[Stream::tangents].format, subject);
       !good)
     return good;
-  if (job.normals.format != VertexFormat::none && !job.mesh.hasNormals)
+  if (job.places[Stream::normals].format != VertexFormat::none && !job.mesh.hasNormals)
     return invalid(subject.name() + " has normals in its output, but its mesh has none");
-  if (job.tangents.format != VertexFormat::none && !job.mesh.hasTangents)
+  if (job.places[Stream::tangents].format != VertexFormat::none && !job.mesh.hasTangents)
     return invalid(subject.name() + " has tangents in its output, but its mesh has none");
   if (Result<void> good = checkMotion(job, subject); !good) return good;
   if (!job.morphs.empty()) {
     if (Result<void> good = checkMorphs(job.morphs, job.mesh.morphTargetCount, subject); !good)
       return good;
   }
-  if (isSnormPosition(job.positions.format) && !isBox(job.box)) {
+  if (isSnormPosition(job.places[Stream::positions].format) && !isBox(job.box)) {
     return invalid(subject.name() +
                    ": the box of its snorm16 positions must be finite, with sides longer than 0");
   }

@@ -15,7 +15,7 @@ namespace dermis {
 Error invalid(std::string message);
 /// "WHAT of VALUE is not a multiple of DIVISOR".
 Error notAMultiple(const std::string& what, std::uint64_t value, std::uint64_t divisor);
-/// For a number that is not a value of an enum: "WHAT is 7, which is not a value of Motion".
+/// For a number that is not a value of an enum: "WHAT is 7, which is not a value of Method".
 template <typename Enum>
 Error notAValue(const std::string& what, Enum value, const char* name) {
   return invalid(what + " is " + std::to_string(static_cast<unsigned>(value)) +
@@ -41,6 +41,8 @@ DERMIS_CORE_API Result<void> checkMethod(Method method, const Subject& subject);
 /// Whether positions, normals and tangents may have these formats.
 Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
                           const Subject& subject);
+/// Whether previous positions have the format of the positions, or none.
+Result<void> checkPrevious(const VertexPlaces& places, const Subject& subject);
 /// Whether all members have values that plans use.
 DERMIS_CORE_API Result<void> checkVariant(const Variant& variant);
 /// Whether it stands for such a variant.

@@ -250,7 +250,7 @@ Result<void> Encoder::addDispatches() {
     dispatch.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
     // A kernel that may name the results counts as one that reads them.
     dispatch.isAfterPalettes =
-        palettesRun && (!readsPoses || variant.motion != Motion::none || hasResults(variant));
+        palettesRun && (!readsPoses || variant.motion || hasResults(variant));
     begin = end;
   }
   return {};
@@ -441,7 +441,7 @@ Result<void> Encoder::addVisibilityDispatches(std::uint32_t record) {
 
 namespace {
 
-constexpr Access computeBoth = Access::computeRead | Access::computeWrite;
+constexpr Use computeBoth = Use::computeRead | Use::computeWrite;
 
 }  // namespace
 
@@ -516,7 +516,7 @@ void Encoder::listDispatches(const PlanBuffers& buffers) {
   bool palettesAreVisible = false;
   for (const Dispatch& dispatch : dispatches_) {
     if (dispatch.isAfterPalettes && !palettesAreVisible) {
-      plan_->commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
+      plan_->commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
       palettesAreVisible = true;
     }
     listDispatch(dispatch, buffers);
@@ -552,13 +552,13 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     commands.insert(commands.end(), list.begin(), list.end());
   };
   const bool culls = !work_->culled.empty();
-  constexpr Access copyBoth = Access::copyRead | Access::copyWrite;
+  constexpr Use copyBoth = Use::copyRead | Use::copyWrite;
   // Earlier frames have finished reading what this frame overwrites, and their writes are visible.
   commands.emplace_back(
-      BarrierCommand{computeBoth | copyBoth | Access::indirectRead, computeBoth | copyBoth});
+      BarrierCommand{computeBoth | copyBoth | Use::indirectRead, computeBoth | copyBoth});
   if (!frame.growth.empty()) {
     append(frame.growth);
-    commands.emplace_back(BarrierCommand{Access::copyWrite, copyBoth});
+    commands.emplace_back(BarrierCommand{Use::copyWrite, copyBoth});
   }
   if (!plan_->tables.empty()) {
     BufferPart tables = buffers[BufferRole::tables];
@@ -576,23 +576,23 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     unclear.size -= clear;
     commands.emplace_back(ClearCommand{unclear});
   }
-  commands.emplace_back(BarrierCommand{Access::copyWrite, computeBoth});
+  commands.emplace_back(BarrierCommand{Use::copyWrite, computeBoth});
   if (culls) {
     listDispatch(visibility_[0], buffers);
-    commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth});
+    commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
     listDispatch(visibility_[1], buffers);
-    commands.emplace_back(BarrierCommand{Access::computeWrite, computeBoth | Access::indirectRead});
+    commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth | Use::indirectRead});
   }
   listDispatches(buffers);
   if (culls || !frame.results.empty()) {
-    commands.emplace_back(BarrierCommand{Access::computeWrite, Access::copyRead});
+    commands.emplace_back(BarrierCommand{Use::computeWrite, Use::copyRead});
     if (culls) {
       commands.emplace_back(CopyCommand{counters.buffer, buffers[BufferRole::readBack].buffer, 0,
                                         readBackCounters, counters.size});
       if (frame.history.size != 0) commands.emplace_back(frame.history);
     }
     append(frame.results);
-    commands.emplace_back(BarrierCommand{Access::copyWrite, Access::hostRead});
+    commands.emplace_back(BarrierCommand{Use::copyWrite, Use::hostRead});
   }
   finish();
 }

@@ -42,7 +42,7 @@ class Encoder {
     bool isAfterPalettes = false;
     BufferRole joints = BufferRole::palettes;  ///< that the kernel reads
     std::uint32_t poseBuffer = 0;              ///< of the palette kernel of a scene
-    std::array<std::uint32_t, streamCount> windows{};
+    ByStream<std::uint32_t> windows{};
   };
 
   Result<void> addPaletteDispatches();

@@ -18,8 +18,8 @@ inline constexpr std::uint32_t notUsed = 0xffffffffu;
 struct GroupKey {
   std::uint64_t mesh = 0;  ///< bytes into the mesh buffer
   PipelineId pipeline{};
-  std::array<std::uint32_t, streamCount> windows{};
-  std::array<std::uint32_t, streamCount> strides{};
+  ByStream<std::uint32_t> windows{};
+  ByStream<std::uint32_t> strides{};
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;
   bool isCulled = false;  ///< its instances are chosen on the GPU
@@ -37,8 +37,8 @@ struct Group {
 /// A run of an instance's vertices: its group, and where the first vertex of each attribute is.
 struct PlacedRun {
   std::uint32_t group = notUsed;
-  std::uint32_t joints = 0;                          ///< of its pose
-  std::array<std::uint32_t, streamCount> offsets{};  ///< bytes from the beginning of the window
+  std::uint32_t joints = 0;           ///< of its pose
+  ByStream<std::uint32_t> offsets{};  ///< bytes from the beginning of the window
 };
 
 /// What the place of an instance depends on, besides its job.

@@ -88,7 +88,7 @@ Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits
   runs_.clear();
   firstRuns_.clear();
   Placing placing;
-  placing.windows = {batch.outputs, limits};
+  placing.windows = {batch.outputSizes, limits};
   for (std::size_t index = 0; index < batch.jobs.size(); ++index) {
     const Job& job = batch.jobs[index];
     const OutputStreams streams = outputStreams(job);
@@ -122,7 +122,7 @@ const InstanceExtras* PlanMaker::extrasOf(const Batch& batch, std::size_t index)
   InstanceExtras& extras = extras_[extrasUsed_];
   assignActive(job.morphs, extras.morphs);
   extras.result = results_[index];
-  extras.hasBox = isSnormPosition(job.positions.format);
+  extras.hasBox = isSnormPosition(job.places[Stream::positions].format);
   extras.box = job.box;
   if (!extras.isNeeded()) return nullptr;
   ++extrasUsed_;
@@ -173,7 +173,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   sizes.poses = batch.posesSize;
   sizes.palettes = palettesSize_;
   sizes.results = resultCount_;
-  sizes.outputs = batch.outputs;
+  sizes.outputs = batch.outputSizes;
   work_.begin(groups_);
   addPalettes(batch);
   for (std::uint32_t result = 0; result < resultCount_; ++result)

@@ -24,10 +24,10 @@ bool hasActive(std::span<const MorphWeight> morphs) {
 Variant outputVariant(const Job& job) {
   Variant variant;
   variant.method = job.method;
-  variant.positions = job.positions.format;
-  variant.normals = job.normals.format;
-  variant.tangents = job.tangents.format;
-  variant.motion = job.motion;
+  variant.positions = job.places[Stream::positions].format;
+  variant.normals = job.places[Stream::normals].format;
+  variant.tangents = job.places[Stream::tangents].format;
+  variant.motion = job.places.hasMotion();
   variant.bounds = job.bounds;
   return variant;
 }
@@ -65,8 +65,9 @@ namespace {
 
 /// Of positions, normals and tangents together.
 std::uint32_t recordSize(const Job& job) {
-  return formatSize(job.positions.format) + formatSize(job.normals.format) +
-         formatSize(job.tangents.format);
+  return formatSize(job.places[Stream::positions].format) +
+         formatSize(job.places[Stream::normals].format) +
+         formatSize(job.places[Stream::tangents].format);
 }
 
 /// Whether one store can write a whole vertex.
@@ -93,7 +94,7 @@ bool isWide(const OutputStreams& streams, std::size_t index) {
 void widenStores(const Job& job, Variant& variant) {
   const OutputStreams streams = outputStreams(job);
   const std::uint32_t size = recordSize(job);
-  if (isRecord(job) && standsTogether(streams) && job.positions.stride % size == 0)
+  if (isRecord(job) && standsTogether(streams) && job.places[Stream::positions].stride % size == 0)
     variant.recordBytes = static_cast<std::uint8_t>(size);
   for (std::size_t stream = 0; stream < streamCount; ++stream)
     variant.wide[stream] = isWide(streams, stream);
@@ -104,8 +105,8 @@ bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimit
   return limits.stagedStores && !limits.texelBuffers &&
          limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
          (job.method == Method::linear || job.method == Method::dualQuaternion) &&
-         job.motion == Motion::none && !hasResult(job) && isRecord(job) &&
-         job.positions.stride == recordSize(job) &&
+         !job.places.hasMotion() && !hasResult(job) && isRecord(job) &&
+         job.places[Stream::positions].stride == recordSize(job) &&
          (recordSize(job) == streams[0].size || standsTogether(streams));
 }
 
@@ -176,11 +177,11 @@ std::uint32_t relationsIn(const OutputStreams& streams) {
 
 LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
     : method(job.method),
-      motion(job.motion),
+      motion(job.places.hasMotion()),
       bounds(job.bounds),
-      positions(job.positions.format),
-      normals(job.normals.format),
-      tangents(job.tangents.format),
+      positions(job.places[Stream::positions].format),
+      normals(job.places[Stream::normals].format),
+      tangents(job.places[Stream::tangents].format),
       relations(relationsIn(streams)) {
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     strides[stream] = streams[stream].stride;
@@ -191,9 +192,10 @@ LayoutNeeds::LayoutNeeds(const Job& job, const OutputStreams& streams)
 /// Same result as making a LayoutNeeds of the job and comparing it, which would wait for its bytes
 /// to be stored.
 bool LayoutNeeds::areThoseOf(const Job& job, const OutputStreams& streams) const {
-  if (job.method != method || job.motion != motion || job.bounds != bounds ||
-      job.positions.format != positions || job.normals.format != normals ||
-      job.tangents.format != tangents)
+  if (job.method != method || job.places.hasMotion() != motion || job.bounds != bounds ||
+      job.places[Stream::positions].format != positions ||
+      job.places[Stream::normals].format != normals ||
+      job.places[Stream::tangents].format != tangents)
     return false;
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
     if (streams[stream].stride != strides[stream] ||
@@ -277,6 +279,7 @@ Result<std::vector<PipelineId>> pipelines(const Job& job, const DeviceLimits& li
   if (Result<void> good = checkLimits(limits); !good) return good.error();
   if (Result<void> good = checkTuning(tuning); !good) return good.error();
   if (Result<void> good = checkVariant(outputVariant(job)); !good) return good.error();
+  if (Result<void> good = checkPrevious(job.places, {"the job"}); !good) return good.error();
   if (Result<void> good = checkRuns(job, outputStreams(job), {"the job"}); !good)
     return good.error();
   const FormRanges ranges;
@@ -295,7 +298,7 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   Job job;
   job.method = needs.method;
   job.bounds = needs.bounds;
-  job.place(*places);
+  job.places = *places;
   const FormRanges ranges(needs.mesh, needs.mayScale);
   std::vector<Variant> variants = earlierVariants(job, ranges, limits, tuning);
   if (needs.method == Method::linear)  // a scene copies them
@@ -354,11 +357,10 @@ std::uint64_t outputWindowStep(const DeviceLimits& limits) {
   return step - step % (3 * std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 32));
 }
 
-OutputWindows::OutputWindows(const OutputSizes& sizes, const DeviceLimits& limits)
+OutputWindows::OutputWindows(const ByStream<std::uint64_t>& outputSizes, const DeviceLimits& limits)
     : range(limits.maxStorageBufferRange), step(outputWindowStep(limits)) {
-  const std::array<std::uint64_t, streamCount> bytes = outputSizes(sizes);
   for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    oversized[stream] = bytes[stream] > range;
+    oversized[stream] = outputSizes[stream] > range;
     isAnyOversized = isAnyOversized || oversized[stream];
   }
 }

@@ -29,31 +29,24 @@ struct OutputStream {
   std::uint64_t end(std::uint64_t vertexEnd) const { return begin(vertexEnd - 1) + size; }
 };
 
-using OutputStreams = std::array<OutputStream, streamCount>;
+using OutputStreams = ByStream<OutputStream>;
 
-inline OutputStream outputStream(const OutputAttribute& attribute, VertexFormat format) {
-  if (format == VertexFormat::none) return {};
-  return {attribute.offset, attribute.stride, formatSize(format)};
+inline OutputStream outputStream(const OutputAttribute& attribute) {
+  if (attribute.format == VertexFormat::none) return {};
+  return {attribute.offset, attribute.stride, formatSize(attribute.format)};
 }
 
 inline OutputStreams outputStreams(const Job& job) {
-  const bool hasMotion = job.motion != Motion::none;
-  return {
-      outputStream(job.positions, job.positions.format),
-      outputStream(job.normals, job.normals.format),
-      outputStream(job.tangents, job.tangents.format),
-      outputStream(job.previousPositions, hasMotion ? job.positions.format : VertexFormat::none)};
+  const ByStream<OutputAttribute>& attributes = job.places.attributes;
+  return {{outputStream(attributes[0]), outputStream(attributes[1]), outputStream(attributes[2]),
+           outputStream(attributes[3])}};
 }
 
-inline std::array<std::uint64_t, streamCount> outputSizes(const OutputSizes& sizes) {
-  return {sizes.positions, sizes.normals, sizes.tangents, sizes.previousPositions};
-}
-
-const char* streamName(std::size_t stream);
+DERMIS_CORE_API const char* streamName(std::size_t stream);
 
 /// Whether the kernel writes an `InstanceResult`: bounds, or the number of clamped vertices.
 inline bool hasResult(const Job& job) {
-  return job.bounds || isSnormPosition(job.positions.format);
+  return job.bounds || isSnormPosition(job.places[Stream::positions].format);
 }
 
 /// Whether a skin kernel writes an attribute.
@@ -64,7 +57,7 @@ inline bool writesStream(const Variant& variant, std::size_t stream) {
     case Stream::tangents:
       return variant.tangents != VertexFormat::none;
     case Stream::previousPositions:
-      return variant.motion != Motion::none;
+      return variant.motion;
     default:
       return true;
   }
@@ -101,12 +94,12 @@ struct LayoutNeeds {
   bool areThoseOf(const Job& job, const OutputStreams& streams) const;
 
   Method method = Method::dualQuaternion;
-  Motion motion = Motion::none;
+  bool motion = false;
   bool bounds = false;
   VertexFormat positions = VertexFormat::none, normals = VertexFormat::none,
                tangents = VertexFormat::none;
   std::uint32_t relations = 0;
-  std::array<std::uint32_t, streamCount> strides{}, residues{};
+  ByStream<std::uint32_t> strides{}, residues{};
 };
 
 /// The inputs of `chooseForm`, besides the method.
@@ -131,10 +124,11 @@ inline bool storesWidely(const DeviceLimits& limits) {
 /// Whether the normals of a job directly follow its positions, both are float32x3, and their stride
 /// is a multiple of 8. A kernel can then store them 8 bytes at a time.
 inline bool standsInPairs(const Job& job) {
-  return job.positions.format == VertexFormat::float32x3 &&
-         job.normals.format == VertexFormat::float32x3 &&
-         job.normals.offset == job.positions.offset + 12 &&
-         job.normals.stride == job.positions.stride && job.positions.stride % 8 == 0;
+  return job.places[Stream::positions].format == VertexFormat::float32x3 &&
+         job.places[Stream::normals].format == VertexFormat::float32x3 &&
+         job.places[Stream::normals].offset == job.places[Stream::positions].offset + 12 &&
+         job.places[Stream::normals].stride == job.places[Stream::positions].stride &&
+         job.places[Stream::positions].stride % 8 == 0;
 }
 
 /// Whether attributes of these formats are joined before they are stored, since some are not whole
@@ -160,19 +154,19 @@ inline bool standsTogether(const OutputStreams& streams) {
 /// What the windows of the outputs depend on, besides jobs.
 struct OutputWindows {
   OutputWindows() = default;
-  OutputWindows(const OutputSizes& sizes, const DeviceLimits& limits);
+  OutputWindows(const ByStream<std::uint64_t>& outputSizes, const DeviceLimits& limits);
 
-  std::uint64_t range = 0;                    ///< bytes of the largest window
-  std::uint64_t step = 0;                     ///< `outputWindowStep`
-  std::array<bool, streamCount> oversized{};  ///< the output is larger than a window
-  bool isAnyOversized = false;                ///< usually false
+  std::uint64_t range = 0;      ///< bytes of the largest window
+  std::uint64_t step = 0;       ///< `outputWindowStep`
+  ByStream<bool> oversized{};   ///< the output is larger than a window
+  bool isAnyOversized = false;  ///< usually false
 };
 
 /// Consecutive vertices of one job. Each of their attributes lies in one window of its buffer.
 struct VertexRun {
   std::uint32_t firstVertex = 0;
   std::uint32_t vertexEnd = 0;
-  std::array<std::uint32_t, streamCount> windows{};
+  ByStream<std::uint32_t> windows{};
 };
 
 /// Cuts the vertices of a job into runs: one if each attribute lies in one window. Attributes that

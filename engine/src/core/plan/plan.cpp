@@ -104,13 +104,14 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::results:
       return {resultBytes, alignment, written};
     case BufferRole::positions:
-      return {outputs.positions, isScene ? outputRangeAlignment(limits) : alignment, written};
+      return {outputs[Stream::positions], isScene ? outputRangeAlignment(limits) : alignment,
+              written};
     case BufferRole::normals:
-      return {outputs.normals, alignment, written};
+      return {outputs[Stream::normals], alignment, written};
     case BufferRole::tangents:
-      return {outputs.tangents, alignment, written};
+      return {outputs[Stream::tangents], alignment, written};
     case BufferRole::previousPositions:
-      return {outputs.previousPositions, alignment, written};
+      return {outputs[Stream::previousPositions], alignment, written};
     case BufferRole::readBack:
       if (isScene) return {readBackResults + resultBytes, 4, copiedTo};
       break;

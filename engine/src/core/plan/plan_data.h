@@ -24,7 +24,7 @@ class PlanMaker;
 struct PlanSizes {
   std::uint64_t meshes = 0, poses = 0, gpuPoses = 0, palettes = 0;
   std::uint32_t results = 0;  ///< their number
-  OutputSizes outputs;
+  ByStream<std::uint64_t> outputs{};
   bool isScene = false;  ///< the buffers of a scene exist
   std::uint32_t slots =
       0;  ///< of a scene: words of visibility, records of history; 0 if the GPU chooses nothing

@@ -18,7 +18,7 @@ void visitFields(AnyVariant& variant, const Field& field) {
   field(variant.scales, 1);
   field(variant.bounds, 1);
   field(variant.morphs, 1);
-  field(variant.motion, 2);
+  field(variant.motion, 1);
   for (auto& isWide : variant.wide) field(isWide, 1);
   field(variant.tangents, 4);
   field(variant.normals, 4);

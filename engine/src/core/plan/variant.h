@@ -35,8 +35,8 @@ struct Variant {
   VertexFormat tangents = VertexFormat::none;
   /// By `Stream`: whether one store writes the whole attribute, of 8, 12 or 16 bytes. Only with
   /// `texels`.
-  std::array<bool, streamCount> wide{};
-  Motion motion = Motion::none;
+  ByStream<bool> wide{};
+  bool motion = false;
   /// Whether instances have active morph targets.
   bool morphs = false;
   bool bounds = false;

@@ -93,7 +93,7 @@ struct ScenePose {
 
   std::uint32_t jointCount = 0;
   bool mayScale = true;
-  PoseWriter writer = PoseWriter::cpu;
+  bool writtenByGpu = false;
   std::uint32_t buffer = 0;  ///< its number
   Range joints;              ///< in that buffer, of all slots together
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
@@ -177,7 +177,7 @@ struct SceneBooks {
   };
   /// A buffer of poses. Addresses must stay the same: `Retired` has them.
   struct PoseStore {
-    PoseWriter writer;
+    bool writtenByGpu;
     RangeAllocator joints;
     SceneBufferMemory buffer;
     std::vector<JointMatrix> staged;  ///< what the CPU writes where the buffer is not mapped
@@ -229,7 +229,7 @@ struct SceneBooks {
   // meshes_and_poses.cpp
   /// Keeps the bytes, or the owner does; null if the owner has them already.
   Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
-  Result<void> checkWrite(PoseHandle handle, PoseWriter writer) const;
+  Result<void> checkWrite(PoseHandle handle, bool writtenByGpu) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
   /// Where the matrices of the current slot are in the buffer of the pose.
   std::uint64_t offsetOf(const ScenePose& pose) const {
@@ -247,7 +247,7 @@ struct SceneBooks {
   // stores.cpp
   Result<void> createFirstBuffers();
   Result<SceneBufferMemory> create(BufferRole role, const BufferRequirement& needed);
-  Result<void> addPoseBuffer(PoseWriter writer, std::uint64_t joints);
+  Result<void> addPoseBuffer(bool writtenByGpu, std::uint64_t joints);
   void replace(GrowingBuffer& buffer, const SceneBufferMemory& larger);
   std::array<GrowingBuffer*, 4> keptBuffers() {
     return {&meshStore_.buffer, &outputStore_.buffer, &resultStore_.buffer, &history_};
@@ -259,15 +259,15 @@ struct SceneBooks {
   static Error noRoom(const std::string& what, const Store& store, const char* unit);
   Result<std::optional<Range>> take(Store& store, std::uint64_t size, std::uint64_t alignment);
   Result<void> grow(Store& store, std::uint64_t least);
-  Result<std::optional<Range>> takeJoints(std::uint64_t count, PoseWriter writer,
+  Result<std::optional<Range>> takeJoints(std::uint64_t count, bool writtenByGpu,
                                           std::uint32_t& buffer);
-  Error noJoints(std::size_t poses, std::uint64_t count, PoseWriter writer) const;
+  Error noJoints(std::size_t poses, std::uint64_t count, bool writtenByGpu) const;
   /// In joints.
-  std::uint64_t largestPoseBuffer(PoseWriter writer) const {
-    return limits_.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writer);
+  std::uint64_t largestPoseBuffer(bool writtenByGpu) const {
+    return limits_.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writtenByGpu);
   }
-  std::uint32_t slotsOf(PoseWriter writer) const {
-    return writer == PoseWriter::cpu ? description_.framesInFlight : 1;
+  std::uint32_t slotsOf(bool writtenByGpu) const {
+    return !writtenByGpu ? description_.framesInFlight : 1;
   }
   bool hasSlot() const;
   void makeSlot();

@@ -45,7 +45,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
-  const bool isCpu = pose.writer == PoseWriter::cpu;
+  const bool isCpu = !pose.writtenByGpu;
   const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                           isCpu ? BufferRole::poses : BufferRole::gpuPoses};
   work_.addPose(source, converted.unit, pose.jointCount, form, pose.mayScale);
@@ -217,7 +217,7 @@ Result<void> SceneBooks::gather() {
   work_.arrange();
   for (const Conversion& conversion : conversions_) {
     const ScenePose& pose = poses_.at(conversion.pose.index);
-    if (pose.writer == PoseWriter::cpu) planned_.poseBytes += pose.jointCount * sizeof(JointMatrix);
+    if (!pose.writtenByGpu) planned_.poseBytes += pose.jointCount * sizeof(JointMatrix);
   }
   planned_.frame = frame_;
   planned_.instances = instances_.size();

@@ -14,7 +14,7 @@ constexpr Subject theInstance{"the instance"};
 
 /// Of one vertex, without gaps.
 std::uint32_t attributeBytes(const VertexLayout& layout) {
-  const std::uint32_t positions = layout.motion == Motion::none ? 1 : 2;
+  const std::uint32_t positions = !layout.motion ? 1 : 2;
   return positions * formatSize(layout.positions) + formatSize(layout.normals) +
          formatSize(layout.tangents);
 }
@@ -31,7 +31,7 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
   job.mesh = mesh.info;
   job.meshOffset = mesh.bytes.offset;
   job.method = instance.method;
-  job.place(places);
+  job.places = places;
   job.box = instance.extras.box;
   job.bounds = instance.bounds;
   job.morphs = instance.extras.morphs;
@@ -70,7 +70,7 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   Batch batch;
   batch.poses = {&own, 1};
   batch.meshesSize = meshStore_.ranges.capacity();
-  batch.outputs = OutputSizes::oneBuffer(std::max(outputStore_.ranges.capacity(), laidOut->size));
+  batch.outputSizes.fill(std::max(outputStore_.ranges.capacity(), laidOut->size));
   const Job job = jobOf(instance, *mesh, *laidOut);
   const OutputStreams streams = outputStreams(job);
   if (Result<void> good = checkJob(batch, job, streams, theInstance, limits_); !good) return good;
@@ -141,13 +141,12 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
                                                outputStore_.base + instance.target.bytes.offset);
   if (!laidOut) return laidOut.error();
   // Kernels count from the beginning of the output.
-  for (OutputAttribute* attribute :
-       {&laidOut->positions, &laidOut->normals, &laidOut->tangents, &laidOut->previousPositions}) {
-    if (attribute->format != VertexFormat::none) attribute->offset -= outputStore_.base;
+  for (OutputAttribute& attribute : laidOut->attributes) {
+    if (attribute.format != VertexFormat::none) attribute.offset -= outputStore_.base;
   }
   Placing placing;
   placing.subject = theInstance;
-  placing.windows = {OutputSizes::oneBuffer(outputStore_.ranges.capacity()), limits_};
+  placing.windows = {ByStream<std::uint64_t>::all(outputStore_.ranges.capacity()), limits_};
   placing.jointCount = pose.jointCount;
   placing.mayScale = pose.mayScale;
   placing.isCulled = isCulled;
@@ -250,7 +249,7 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   state.generation = handle.generation;
   state.updateInterval = description.updateInterval;
   state.isCulled = isCulled;
-  state.hasMotion = description.layout.motion != Motion::none;
+  state.hasMotion = description.layout.motion;
   books.link(handle.index);
   if (isCulled) {
     books.instances_.at(handle.index).culledIndex =
@@ -527,11 +526,7 @@ Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   output.isWritten = instance->isWritten;
   output.mesh = place.mesh;
   output.offset = offset;
-  output.size = place.bytes.size;
-  output.positions = places->positions;
-  output.normals = places->normals;
-  output.tangents = places->tangents;
-  output.previousPositions = places->previousPositions;
+  output.places = *places;
   return output;
 }
 
@@ -559,9 +554,9 @@ Result<void> Scene::indexedDraws(std::span<const InstanceHandle> instances,
       return wrong(ErrorCode::invalidArgument, "there is no range of indices for its mesh");
     if (layout == nullptr || *layout != instance->layout) {
       layout = &instance->layout;
-      if (layout->arrangement != Arrangement::interleaved)
+      if (layout->planar)
         return wrong(ErrorCode::invalidArgument, "its attributes are not interleaved");
-      const std::uint32_t own = placeVertices(*layout, 1)->positions.stride;
+      const std::uint32_t own = (*placeVertices(*layout, 1))[Stream::positions].stride;
       if (number != 0 && own != stride) {
         return wrong(ErrorCode::invalidArgument, "its stride of " + std::to_string(own) +
                                                      " bytes is not the first one, " +

@@ -72,25 +72,23 @@ Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCou
     return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
-  if (options.writer > PoseWriter::gpu)
-    return notAValue("the writer of the pose", options.writer, "PoseWriter");
-  const bool isCpu = options.writer == PoseWriter::cpu;
-  if (books.owner_.isCpu && !isCpu)
+  if (books.owner_.isCpu && options.writtenByGpu)
     return invalid("a pose that the GPU writes cannot be skinned on the CPU");
   if (poses.empty()) return {};
   ScenePose pose;
   const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
-  const Result<std::optional<Range>> joints = books.takeJoints(count, options.writer, pose.buffer);
+  const Result<std::optional<Range>> joints =
+      books.takeJoints(count, options.writtenByGpu, pose.buffer);
   if (!joints) return joints.error();
-  if (!*joints) return books.noJoints(poses.size(), count, options.writer);
+  if (!*joints) return books.noJoints(poses.size(), count, options.writtenByGpu);
   pose.jointCount = jointCount;
   pose.mayScale = options.mayScale;
-  pose.writer = options.writer;
-  const std::uint64_t size = std::uint64_t{jointCount} * books.slotsOf(options.writer);
+  pose.writtenByGpu = options.writtenByGpu;
+  const std::uint64_t size = std::uint64_t{jointCount} * books.slotsOf(options.writtenByGpu);
   for (std::size_t index = 0; index < poses.size(); ++index) {
     pose.joints = {(*joints)->offset + index * size, size};
     poses[index] = books.poses_.add(pose);
-    if (!isCpu) continue;
+    if (options.writtenByGpu) continue;
     // No frame in flight reads their memory: it was free.
     std::ranges::fill(books.matricesOf(pose), JointMatrix{});
     books.upload(poses[index]);
@@ -117,7 +115,7 @@ Result<void> Scene::removePose(PoseHandle handle) {
 Result<BufferPart> SceneBooks::posePart(PoseHandle handle) const {
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
-  if (pose->writer == PoseWriter::cpu) {
+  if (!pose->writtenByGpu) {
     return invalid("pose " + std::to_string(handle.index) +
                    " is written by the CPU; use writePose");
   }
@@ -133,16 +131,16 @@ std::span<JointMatrix> SceneBooks::matricesOf(const ScenePose& pose) {
   return {begin + offsetOf(pose) / sizeof(JointMatrix), pose.jointCount};
 }
 
-Result<void> SceneBooks::checkWrite(PoseHandle handle, PoseWriter writer) const {
+Result<void> SceneBooks::checkWrite(PoseHandle handle, bool writtenByGpu) const {
   // Before the first frame, poses are written for it.
   if (!hasBegun_ && frame_ != 0)
     return invalid("a pose can be written only between beginFrame and record");
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
-  if (pose->writer == writer) return {};
+  if (pose->writtenByGpu == writtenByGpu) return {};
   return invalid("pose " + std::to_string(handle.index) +
-                 (writer == PoseWriter::cpu ? " is written by the GPU; use markWritten"
-                                            : " is written by the CPU; use writePose"));
+                 (writtenByGpu ? " is written by the CPU; use writePose"
+                               : " is written by the GPU; use markWritten"));
 }
 
 void SceneBooks::markWritten(ScenePose& pose, PoseHandle handle) {
@@ -153,7 +151,7 @@ void SceneBooks::markWritten(ScenePose& pose, PoseHandle handle) {
 
 Result<std::span<JointMatrix>> Scene::writePose(PoseHandle handle) {
   SceneBooks& books = changed();
-  if (Result<void> good = books.checkWrite(handle, PoseWriter::cpu); !good) return good.error();
+  if (Result<void> good = books.checkWrite(handle, false); !good) return good.error();
   ScenePose& pose = books.poses_.at(handle.index);
   if (pose.poseFrame != books.frame_) {
     // The next of its slots: the GPU is done with it, since it was superseded at least as many
@@ -169,7 +167,7 @@ Result<std::span<JointMatrix>> Scene::writePose(PoseHandle handle) {
 Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
   SceneBooks& books = changed();
   for (const PoseHandle handle : poses) {
-    if (Result<void> good = books.checkWrite(handle, PoseWriter::gpu); !good) return good;
+    if (Result<void> good = books.checkWrite(handle, true); !good) return good;
     ScenePose& pose = books.poses_.at(handle.index);
     if (pose.poseFrame != books.frame_) books.markWritten(pose, handle);
   }
@@ -179,7 +177,7 @@ Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
 Result<void> Scene::markAllWritten() {
   SceneBooks& books = changed();
   for (std::uint32_t index = 0; index < books.poses_.capacity(); ++index) {
-    if (!books.poses_.isUsed(index) || books.poses_.at(index).writer != PoseWriter::gpu) continue;
+    if (!books.poses_.isUsed(index) || !books.poses_.at(index).writtenByGpu) continue;
     const PoseHandle handle = books.poses_.handleOf(index);
     if (Result<void> marked = markWritten({&handle, 1}); !marked) return marked;
   }

@@ -113,7 +113,7 @@ PlanSizes sceneSizes(const SceneSetup& setup) {
   sizes.gpuPoses = scene.gpuJointCapacity.initial * sizeof(JointMatrix);
   sizes.palettes = firstUnits(setup) * unitBytes;
   sizes.results = static_cast<std::uint32_t>(scene.boundsCapacity.initial);
-  sizes.outputs = OutputSizes::oneBuffer(scene.outputCapacity.initial);
+  sizes.outputs.fill(scene.outputCapacity.initial);
   sizes.isScene = true;
   sizes.slots = static_cast<std::uint32_t>(scene.instanceCapacity.initial);
   return sizes;

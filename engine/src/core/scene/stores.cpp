@@ -25,7 +25,7 @@ void setSize(PlanSizes& sizes, BufferRole role, std::uint64_t units) {
       sizes.results = static_cast<std::uint32_t>(units);
       break;
     default:
-      sizes.outputs = OutputSizes::oneBuffer(units);
+      sizes.outputs.fill(units);
   }
 }
 
@@ -59,27 +59,27 @@ Result<void> SceneBooks::createFirstBuffers() {
     store->buffer.now = *made;
   }
   output_ = outputStore_.buffer.now.number;
-  for (const PoseWriter writer : {PoseWriter::cpu, PoseWriter::gpu}) {
-    const bool isCpu = writer == PoseWriter::cpu;
+  for (const bool writtenByGpu : {false, true}) {
+    const bool isCpu = !writtenByGpu;
     const std::uint64_t joints =
         (isCpu ? description_.jointCapacity : description_.gpuJointCapacity).initial;
     if (joints == 0) continue;
-    if (Result<void> added = addPoseBuffer(writer, joints); !added) return added;
+    if (Result<void> added = addPoseBuffer(writtenByGpu, joints); !added) return added;
   }
   return {};
 }
 
-Result<void> SceneBooks::addPoseBuffer(PoseWriter writer, std::uint64_t joints) {
-  const bool isCpu = writer == PoseWriter::cpu;
+Result<void> SceneBooks::addPoseBuffer(bool writtenByGpu, std::uint64_t joints) {
+  const bool isCpu = !writtenByGpu;
   const BufferRole role = isCpu ? BufferRole::poses : BufferRole::gpuPoses;
-  joints *= slotsOf(writer);
+  joints *= slotsOf(writtenByGpu);
   PlanSizes added;
   added.isScene = true;
   added.poses = added.gpuPoses = joints * sizeof(JointMatrix);
   const Result<SceneBufferMemory> made = create(role, added.requirement(role, 0, limits_));
   if (!made) return made.error();
   PoseStore& store =
-      poseBuffers_.emplace_back(PoseStore{writer, RangeAllocator(joints), *made, {}});
+      poseBuffers_.emplace_back(PoseStore{writtenByGpu, RangeAllocator(joints), *made, {}});
   if (isCpu && made->mapped == nullptr) store.staged.resize(static_cast<std::size_t>(joints));
   return {};
 }
@@ -175,46 +175,45 @@ Error SceneBooks::noRoom(const std::string& what, const Store& store, const char
 
 /// Takes `count` consecutive matrices for each slot, and sets `buffer`. Adds a pose buffer if none
 /// has room. Returns nothing if the maximum is reached.
-Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, PoseWriter writer,
+Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, bool writtenByGpu,
                                                     std::uint32_t& buffer) {
-  const std::uint64_t slots = slotsOf(writer);
+  const std::uint64_t slots = slotsOf(writtenByGpu);
   // So that poses that the GPU writes can be bound at their offset.
   const std::uint64_t bound = limits_.minStorageBufferOffsetAlignment;
-  const std::uint64_t alignment =
-      writer == PoseWriter::gpu ? bound / std::gcd(bound, sizeof(JointMatrix)) : 1;
+  const std::uint64_t alignment = writtenByGpu ? bound / std::gcd(bound, sizeof(JointMatrix)) : 1;
   std::uint64_t total = 0;
   for (buffer = 0; buffer < poseBuffers_.size(); ++buffer) {
     PoseStore& store = poseBuffers_[buffer];
-    if (store.writer != writer) continue;
+    if (store.writtenByGpu != writtenByGpu) continue;
     if (const std::optional<Range> range = store.joints.allocate(count * slots, alignment))
       return range;
     total += store.joints.capacity() / slots;
   }
-  const bool isCpu = writer == PoseWriter::cpu;
+  const bool isCpu = !writtenByGpu;
   const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
-  const std::uint64_t most =
-      std::min(largestPoseBuffer(writer), capacity.maximum - std::min(capacity.maximum, total));
+  const std::uint64_t most = std::min(largestPoseBuffer(writtenByGpu),
+                                      capacity.maximum - std::min(capacity.maximum, total));
   if (count > most) return std::optional<Range>();
   const std::uint64_t joints = std::min(std::max({count, total, leastJoints}), most);
-  Result<void> made = addPoseBuffer(writer, joints);
-  if (!made && joints > count) made = addPoseBuffer(writer, count);
+  Result<void> made = addPoseBuffer(writtenByGpu, joints);
+  if (!made && joints > count) made = addPoseBuffer(writtenByGpu, count);
   if (!made) return made.error();
   return poseBuffers_.back().joints.allocate(count * slots, 1);
 }
 
-Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, PoseWriter writer) const {
-  const bool isCpu = writer == PoseWriter::cpu;
+Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, bool writtenByGpu) const {
+  const bool isCpu = !writtenByGpu;
   std::uint64_t held = 0, used = 0;
   for (const PoseStore& store : poseBuffers_) {
-    if (store.writer != writer) continue;
-    held += store.joints.capacity() / slotsOf(writer);
-    used += store.joints.used() / slotsOf(writer);
+    if (store.writtenByGpu != writtenByGpu) continue;
+    held += store.joints.capacity() / slotsOf(writtenByGpu);
+    used += store.joints.used() / slotsOf(writtenByGpu);
   }
   const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
   return {ErrorCode::limitExceeded,
           (poses == 1 ? std::string("a pose takes ") : std::to_string(poses) + " poses take ") +
               std::to_string(count) + " joints in one pose buffer, which holds at most " +
-              std::to_string(largestPoseBuffer(writer)) + "; all pose buffers that the " +
+              std::to_string(largestPoseBuffer(writtenByGpu)) + "; all pose buffers that the " +
               (isCpu ? "CPU" : "GPU") + " writes hold " + std::to_string(held) +
               " joints, of which " + std::to_string(used) + " are in use; their maximum is " +
               std::to_string(capacity.maximum)};

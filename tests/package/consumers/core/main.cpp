@@ -185,9 +185,12 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
     Job& job = jobs.emplace_back();
     job.mesh = info;
     job.method = method;
-    job.positions = attribute(offsetof(SkinnedVertex, position), VertexFormat::snorm16x4);
-    job.normals = attribute(offsetof(SkinnedVertex, normal), VertexFormat::snorm8x4);
-    job.tangents = attribute(offsetof(SkinnedVertex, tangent), VertexFormat::snorm16x4);
+    job.places[Stream::positions] =
+        attribute(offsetof(SkinnedVertex, position), VertexFormat::snorm16x4);
+    job.places[Stream::normals] =
+        attribute(offsetof(SkinnedVertex, normal), VertexFormat::snorm8x4);
+    job.places[Stream::tangents] =
+        attribute(offsetof(SkinnedVertex, tangent), VertexFormat::snorm16x4);
     job.box = box;
     job.morphs = {&morph, 1};
     job.bounds = true;
@@ -197,7 +200,7 @@ Result<void> planBatch(const MeshInfo& info, const Box& box) {
   batch.jobs = jobs;
   batch.meshesSize = info.byteSize;
   batch.posesSize = jointCount * sizeof(JointMatrix);
-  batch.outputs = OutputSizes::oneBuffer(jobs.size() * vertexCount * sizeof(SkinnedVertex));
+  batch.outputSizes.fill(jobs.size() * vertexCount * sizeof(SkinnedVertex));
   DeviceLimits limits;
   limits.maxStorageBuffersPerStage = storageBuffersWanted;
   const Tuning tuning;

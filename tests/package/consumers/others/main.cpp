@@ -71,7 +71,7 @@ Result<bool> skinTriangle() {
   float skinnedFloats[3][3] = {};
   cpu::Instance instance;
   instance.pose = palette;
-  instance.output = skinnedFloats;
+  instance.output.fill(skinnedFloats);
   instance.morphs = {&morph, 1};
   cpu::Job job;
   job.mesh = &*mesh;
@@ -129,7 +129,7 @@ int main(int argc, char** argv) {
   std::printf("%s\n", refused.error().message.c_str());
 
 #ifdef HAS_RUNTIME_COMPILER
-  const Result<RuntimeCompiler> runtime = RuntimeCompiler::create({argv[1], {}});
+  const Result<RuntimeCompiler> runtime = RuntimeCompiler::create(argv[1]);
   if (!runtime) return fail(runtime.error());
   const vulkan::KernelSource source = runtime->source();
   if (const auto palette = source.get(source.user, "palette"); !palette)

@@ -39,9 +39,9 @@ bool refuses(const vulkan::DeviceDescription& description, ErrorCode code) {
 /// pipelines.
 bool hasKernels() {
   Job job;
-  job.positions = {0, 16, VertexFormat::float16x4};
-  job.normals = {8, 16, VertexFormat::octahedral16x2};
-  job.tangents = {12, 16, VertexFormat::octahedral16x2};
+  job.places[Stream::positions] = {0, 16, VertexFormat::float16x4};
+  job.places[Stream::normals] = {8, 16, VertexFormat::octahedral16x2};
+  job.places[Stream::tangents] = {12, 16, VertexFormat::octahedral16x2};
   for (const std::uint32_t buffers : {storageBuffersWanted, 4u}) {
     DeviceLimits limits;
     limits.maxStorageBuffersPerStage = buffers;
@@ -127,7 +127,7 @@ int main() {
   std::printf("kernels %016llx\n", static_cast<unsigned long long>(hashOfKernels()));
   if (!hasKernels()) return 1;
   if (!hasChosenKernels()) return 5;
-  if (vulkan::barrierBetween(vulkan::Use::dermis, vulkan::Use::vertexInput).destinationAccesses !=
+  if (vulkan::barrierBetween(Use::dermis, Use::vertexInput).destinationAccesses !=
       VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT)
     return 2;
 
