@@ -66,6 +66,7 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   plan.limits = limits;
   plan.sizes = sizes;
   dispatches_.clear();
+  if (work.isEmpty()) return {};
   if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
@@ -469,17 +470,17 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = joints;
     const std::uint64_t range = limits_.maxStorageBufferRange;
-    const std::uint64_t step = outputWindowStep(limits_);
-    const std::uint32_t common = std::ranges::max(dispatch.windows);
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       BufferPart& part = parts[abi::BINDING_POSITIONS + stream];
       part = parts[abi::BINDING_POSITIONS];
       if (!writesStream(variant, stream)) continue;
       part = buffers.parts[static_cast<std::size_t>(BufferRole::positions) + stream];
       if (part.size > range) {
+        const std::uint64_t step = outputWindowStep(limits_);
         // Without separate ranges all outputs that have several windows have the same one.
-        const std::uint64_t begin =
-            (limits_.separateRanges ? dispatch.windows[stream] : common) * step;
+        const std::uint64_t begin = (limits_.separateRanges ? dispatch.windows[stream]
+                                                            : std::ranges::max(dispatch.windows)) *
+                                    step;
         part.offset = std::min(begin, (part.size - 1) / step * step);
         part.size = std::min(part.size - part.offset, range);
       }
@@ -539,14 +540,17 @@ void Encoder::finish() {
   }
 }
 
+bool Encoder::listsNothing(const FrameWork& frame) const {
+  return dispatches_.empty() && frame.growth.empty() && frame.uploads.empty() &&
+         frame.moves.empty();
+}
+
 void Encoder::listBatch(const PlanBuffers& buffers) {
   listDispatches(buffers);
   finish();
 }
 
 void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
-  if (dispatches_.empty() && frame.growth.empty() && frame.uploads.empty() && frame.moves.empty())
-    return;
   std::vector<Command>& commands = plan_->commands;
   const auto append = [&commands](const auto& list) {
     commands.insert(commands.end(), list.begin(), list.end());

@@ -32,6 +32,8 @@ class Encoder {
   Result<void> encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
                       const PlanSizes& sizes, PlanData& plan, std::uint32_t record = 0);
   void listBatch(const PlanBuffers& buffers);
+  /// Whether the frame has no commands, so that its buffers need no names.
+  bool listsNothing(const FrameWork& frame) const;
   void listFrame(const PlanBuffers& buffers, const FrameWork& frame);
 
  private:

@@ -82,6 +82,7 @@ struct Work {
   std::vector<std::uint32_t> order;
 
   void begin(Groups& groupsInUse);
+  bool isEmpty() const { return poseCount == 0 && clearedResults.empty() && instances.empty(); }
 
   /// A batch has only pose buffer 0.
   void addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,

@@ -272,9 +272,11 @@ Result<void> SceneBooks::plan(Plan& out) {
   }
   listGrowth();
   listUploads();
-  nameBuffers();
-  encoder_.listFrame(buffers_,
-                     {clearHistory_, growth_, uploads_, moves_, resultCopies_, historyCopy_});
+  const FrameWork frame{clearHistory_, growth_, uploads_, moves_, resultCopies_, historyCopy_};
+  if (!encoder_.listsNothing(frame)) {
+    nameBuffers();
+    encoder_.listFrame(buffers_, frame);
+  }
   isPlanned_ = true;
   return {};
 }
