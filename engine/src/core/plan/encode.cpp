@@ -79,6 +79,9 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   if (plan.tables.size() * 4 > limits.maxStorageBufferRange)
     return tooLargeForRange("tables", plan.tables.size() * 4, limits);
   plan.instanceCount = static_cast<std::uint32_t>(work.instances.size());
+  // Commands point into the list, so it must not move.
+  plan.bindings.reserve((dispatches_.size() + visibility_.size()) *
+                        (abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT));
   return {};
 }
 
@@ -498,19 +501,25 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   const std::uint32_t count = limits_.maxStorageBuffersPerStage < storageBuffersWanted
                                   ? abi::MIN_BINDING_COUNT
                                   : abi::BINDING_COUNT;
+  std::vector<Binding>& bindings = plan_->bindings;
+  const std::size_t first = bindings.size();
   for (std::uint32_t slot = 0; slot < count; ++slot) {
-    if (parts[slot].size != 0) plan_->bindings.push_back({slot, 0, parts[slot]});
+    if (parts[slot].size != 0) bindings.push_back({slot, 0, parts[slot]});
   }
   if (variant.texels) {
     const auto texels = [&](std::uint32_t slot, std::uint32_t size, const BufferPart& part) {
-      if (part.size >= size) plan_->bindings.push_back({slot, size, part});
+      if (part.size >= size) bindings.push_back({slot, size, part});
     };
     texels(abi::BINDING_TABLE_TEXELS, 16, tables);
     texels(abi::BINDING_MESH_TEXELS, 16, buffers[BufferRole::meshes]);
     texels(abi::BINDING_MESH_WORDS, 4, buffers[BufferRole::meshes]);
     texels(abi::BINDING_PALETTE_TEXELS, 16, joints);
   }
-  plan_->commands.emplace_back(dispatch.command);
+  auto& command = std::get<DispatchCommand>(
+      plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));
+  command.bindings = std::span(bindings).subspan(first);
+  if (std::ranges::find(plan_->pipelines, command.pipeline) == plan_->pipelines.end())
+    plan_->pipelines.push_back(command.pipeline);
 }
 
 void Encoder::listDispatches(const PlanBuffers& buffers) {
@@ -524,22 +533,6 @@ void Encoder::listDispatches(const PlanBuffers& buffers) {
   }
 }
 
-/// Lists each pipeline once, and tells dispatches where their bindings are.
-void Encoder::finish() {
-  std::span<const Binding> bindings = plan_->bindings;
-  for (Command& command : plan_->commands) {
-    auto* dispatch = std::get_if<DispatchCommand>(&command);
-    if (dispatch == nullptr) continue;
-    if (std::ranges::find(plan_->pipelines, dispatch->pipeline) == plan_->pipelines.end())
-      plan_->pipelines.push_back(dispatch->pipeline);
-    // Each list begins with the tables.
-    std::size_t count = 1;
-    while (count < bindings.size() && bindings[count].slot != abi::BINDING_TABLES) ++count;
-    dispatch->bindings = bindings.first(count);
-    bindings = bindings.subspan(count);
-  }
-}
-
 bool Encoder::listsNothing(const FrameWork& frame) const {
   return dispatches_.empty() && frame.growth.empty() && frame.uploads.empty() &&
          frame.moves.empty();
@@ -547,7 +540,6 @@ bool Encoder::listsNothing(const FrameWork& frame) const {
 
 void Encoder::listBatch(const PlanBuffers& buffers) {
   listDispatches(buffers);
-  finish();
 }
 
 void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
@@ -598,7 +590,6 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     append(frame.results);
     commands.emplace_back(BarrierCommand{Use::copyWrite, Use::hostRead});
   }
-  finish();
 }
 
 }  // namespace dermis

@@ -67,7 +67,6 @@ class Encoder {
   Result<void> addVisibilityDispatches(std::uint32_t record);
   void listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers);
   void listDispatches(const PlanBuffers& buffers);
-  void finish();
 
   PlanData* plan_ = nullptr;
   const Work* work_ = nullptr;
