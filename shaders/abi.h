@@ -311,11 +311,12 @@ struct CounterRecord {
   uint workgroups;
 };
 
-// Further bindings of the visibility kernel. It also has BINDING_TABLES, which it reads and writes,
-// and BINDING_RESULTS (not with ONE_OUTPUT).
+// Further bindings of the visibility kernel, which fits devices with MIN_BINDING_COUNT storage
+// buffers. It also has BINDING_TABLES, which it reads and writes. The history buffer begins with a
+// CounterRecord.
 DERMIS_CONSTANT BINDING_VISIBILITY = 1u;
 DERMIS_CONSTANT BINDING_HISTORY = 2u;
-DERMIS_CONSTANT BINDING_COUNTERS = 3u;
+DERMIS_CONSTANT BINDING_VISIBLE_RESULTS = 3u;
 
 // ---- Push constants of each kernel. Word offsets count from the beginning of the tables.
 

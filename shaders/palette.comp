@@ -3,7 +3,8 @@
 #extension GL_EXT_control_flow_attributes : require
 
 // Converts joint matrices (3×4) to unit dual quaternions and, if poses may scale, to scale and shear parts (the identity for rigid
-// joints). One workgroup converts one palette, so that the status of the whole palette needs no second pass.
+// joints). One workgroup converts one palette, so that the status of the whole palette needs no second pass. For linear blending in
+// a scene it copies them: the skin kernel then reads device memory, and not the memory that the CPU writes.
 //   LOGARITHMS      converts to logarithms of the rigid parts instead of dual quaternions
 
 #include "abi.h"
@@ -15,13 +16,14 @@
 #endif
 #include "tables.glsl"
 
+layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
 layout(push_constant) uniform Push { PalettePush push; };
 
-layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Matrices { vec4 matrices[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Matrices { uvec4 matrices[]; };
 layout(set = 0, binding = BINDING_PALETTES, std430) writeonly buffer Palettes { uvec4 palettes[]; };
 
 shared uint nonRigidJoints;
@@ -69,6 +71,12 @@ void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
   PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
+  if (METHOD == METHOD_LINEAR) {
+    uint units = palette.jointCount * UNITS_OF_MATRIX;
+    for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x)
+      palettes[palette.place + unit] = matrices[palette.matrices + unit];
+    return;
+  }
   if (gl_LocalInvocationID.x == 0u) {
     nonRigidJoints = 0u;
     nonFiniteJoints = 0u;
@@ -86,7 +94,7 @@ void main() {
     [[dont_unroll]] do {
       r0 = r1;
       r1 = r2;
-      r2 = matrices[from];
+      r2 = uintBitsToFloat(matrices[from]);
     } while (++from != end);
 
     vec4 rotation;

@@ -14,11 +14,14 @@ void countClamped(uint result) {}
 
 #else
 
-layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer Results { ResultRecord results[]; };
+#ifndef RESULTS_BINDING
+#define RESULTS_BINDING BINDING_RESULTS
+#endif
+layout(set = 0, binding = RESULTS_BINDING, std430) coherent buffer Results { ResultRecord results[]; };
 #ifdef TEXELS
 // The same buffer in 64-bit words. lavapipe loads each lane separately, so reading a box by three 64-bit loads takes less time than
 // by six 32-bit loads.
-layout(set = 0, binding = BINDING_RESULTS, std430) coherent buffer ResultPairs { uint64_t resultPairs[]; };
+layout(set = 0, binding = RESULTS_BINDING, std430) coherent buffer ResultPairs { uint64_t resultPairs[]; };
 #endif
 
 void clearResult(uint result) {

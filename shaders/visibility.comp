@@ -5,17 +5,20 @@
 // Chooses, among the instances that are culled on the GPU, those that are visible and have something new to show. In the first pass
 // (VISIBILITY_CHOOSES) a workgroup processes the instances of one group, and moves the records of the chosen ones to the front, in
 // their order (a prefix sum). In the second pass (VISIBILITY_COUNTS) a workgroup processes the groups of one dispatch: it writes
-// their `workgroupEnd`, and the arguments of the dispatch. With ONE_OUTPUT there are no results, and four storage buffers in all.
+// their `workgroupEnd`, and the arguments of the dispatch.
 
 #define TABLES_ARE_WRITTEN
+#define RESULTS_BINDING BINDING_VISIBLE_RESULTS
 #include "results.glsl"
 #include "tables.glsl"
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
 layout(set = 0, binding = BINDING_VISIBILITY, std430) restrict readonly buffer Visibility { uint visibility[]; };
-layout(set = 0, binding = BINDING_HISTORY, std430) buffer History { HistoryRecord history[]; };
-layout(set = 0, binding = BINDING_COUNTERS, std430) buffer Counters { CounterRecord counters; };
+layout(set = 0, binding = BINDING_HISTORY, std430) buffer History {
+  CounterRecord counters;
+  HistoryRecord history[];
+};
 
 layout(push_constant) uniform Push { VisibilityPush push; };
 

@@ -295,7 +295,7 @@ TEST_F(MockSystemTest, TheVisibilityKernelSeesTheSameBuffersWithoutPushedDescrip
       for (std::size_t number = 0; number < 2; ++number) {
         auto& sizes = dispatches.emplace_back();
         for (const auto& [binding, descriptor] : mock.dispatches[number].descriptors) {
-          if (binding > abi::BINDING_COUNTERS && binding != abi::BINDING_RESULTS) continue;
+          if (binding > abi::BINDING_VISIBLE_RESULTS) continue;
           sizes.push_back(binding);
           sizes.push_back(descriptor.range);
         }

@@ -207,10 +207,10 @@ struct VertexPlaces {
   bool hasMotion() const {
     return attributes[Stream::previousPositions].format != VertexFormat::none;
   }
-  OutputAttribute& operator[](Stream stream) { return attributes[stream]; }  ///< one attribute
-  const OutputAttribute& operator[](Stream stream) const {
-    return attributes[stream];
-  }  ///< one attribute
+  /// One attribute.
+  OutputAttribute& operator[](Stream stream) { return attributes[stream]; }
+  /// One attribute.
+  const OutputAttribute& operator[](Stream stream) const { return attributes[stream]; }
 };
 
 /// Places `vertexCount` vertices at byte `offset` of a buffer. Fails with `invalidArgument`

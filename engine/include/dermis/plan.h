@@ -219,13 +219,12 @@ enum class BufferRole : std::uint8_t {
   previousPositions = 8,  ///< positions of the previous frame
   // Only in a scene (scene.h).
   gpuPoses = 9,   ///< joint matrices that a GPU pass of the engine writes
-  readBack = 10,  ///< what the CPU reads of a complete frame; copied from counters and results
+  readBack = 10,  ///< what the CPU reads of a complete frame; copied from history and results
   /// A word for each instance, not 0 if it is visible. The engine's culling writes it.
   visibility = 11,
-  history = 12,   ///< what the visibility kernel remembers from frame to frame
-  counters = 13,  ///< what the visibility kernel counts
+  history = 12,  ///< what the visibility kernel counts, and remembers from frame to frame
 };
-inline constexpr std::size_t bufferRoleCount = 14;  ///< number of values of `BufferRole`
+inline constexpr std::size_t bufferRoleCount = 13;  ///< number of values of `BufferRole`
 
 /// What a buffer of a plan or a scene needs.
 struct BufferRequirement {

@@ -101,14 +101,10 @@ std::vector<std::uint32_t> constantsOf(const Variant& variant) {
 
 /// Must match the names in shaders/CMakeLists.txt.
 std::string moduleName(const Variant& variant) {
-  if (variant.kernel == Kernel::palette) {
-    return variant.method == Method::linear      ? "palette_matrices"
-           : variant.method == Method::logMatrix ? "palette_logarithms"
-                                                 : "palette";
-  }
+  if (variant.kernel == Kernel::palette)
+    return variant.method == Method::logMatrix ? "palette_logarithms" : "palette";
   if (variant.kernel == Kernel::clear) return "clear";
-  if (variant.kernel == Kernel::visibility)
-    return variant.oneOutput ? "visibility_one_output" : "visibility";
+  if (variant.kernel == Kernel::visibility) return "visibility";
   std::string name = "skin";
   if (isForComparison(variant.method)) name += "_comparison";
   if (isAgainstBulge(variant.method)) name += "_bulge";

@@ -467,8 +467,7 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   if (variant.kernel == Kernel::visibility) {
     parts[abi::BINDING_VISIBILITY] = buffers[BufferRole::visibility];
     parts[abi::BINDING_HISTORY] = buffers[BufferRole::history];
-    parts[abi::BINDING_COUNTERS] = buffers[BufferRole::counters];
-    parts[abi::BINDING_RESULTS] = orElse(results, buffers[BufferRole::counters]);
+    parts[abi::BINDING_VISIBLE_RESULTS] = orElse(results, buffers[BufferRole::history]);
   } else if (variant.kernel == Kernel::skin) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = joints;
@@ -563,10 +562,11 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
   }
   append(frame.uploads);
   append(frame.moves);
-  const BufferPart& counters = buffers[BufferRole::counters];
+  const BufferPart counters{buffers[BufferRole::history].buffer, 0, historyRecords};
   if (culls) commands.emplace_back(ClearCommand{counters});
   BufferPart unclear = buffers[BufferRole::history];
-  const std::uint64_t clear = frame.clearHistory * std::uint64_t{sizeof(abi::HistoryRecord)};
+  const std::uint64_t clear =
+      historyRecords + frame.clearHistory * std::uint64_t{sizeof(abi::HistoryRecord)};
   if (culls && clear < unclear.size) {
     unclear.offset += clear;
     unclear.size -= clear;

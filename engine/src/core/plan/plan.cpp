@@ -118,11 +118,8 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::visibility:
       return {slots * std::uint64_t{4}, alignment, storage};
     case BufferRole::history:
-      return {slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment, written};
-    case BufferRole::counters:
-      if (slots != 0)
-        return {sizeof(abi::CounterRecord), alignment, storage | copiedTo | copiedFrom};
-      break;
+      return {historyRecords + slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment,
+              written};
   }
   return {};
 }

@@ -17,6 +17,8 @@ namespace dermis {
 /// Offsets of a frame's results and counters in its read-back buffer.
 inline constexpr std::uint64_t readBackCounters = 0;
 inline constexpr std::uint64_t readBackResults = sizeof(abi::CounterRecord);
+/// Offset of the records in the history buffer: after the counters.
+inline constexpr std::uint64_t historyRecords = sizeof(abi::CounterRecord);
 
 class PlanMaker;
 

@@ -331,7 +331,7 @@ struct SceneBooks {
   std::vector<InstanceState> states_;  ///< of each instance, by index
   Store meshStore_, unitStore_, outputStore_, resultStore_;
   GrowingBuffer history_;
-  SceneBufferMemory tables_, counters_;
+  SceneBufferMemory tables_;
   std::uint32_t output_ = noBuffer;  ///< the buffer of the last frame
   std::deque<PoseStore> poseBuffers_;
   std::uint64_t slotCapacity_ = 0;  ///< of instances

@@ -267,6 +267,7 @@ Result<void> SceneBooks::plan(Plan& out) {
   for (CopyCommand& copy : resultCopies_) copy.to = nextReadBack().buffer.number;
   if (historyCopy_.size != 0) {
     historyCopy_.from = history_.now.number;
+    historyCopy_.fromOffset = historyRecords;
     historyCopy_.to = nextReadBack().buffer.number;
     historyCopy_.toOffset = readBackResults + sizes().results * sizeof(InstanceResult);
   }

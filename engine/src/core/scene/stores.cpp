@@ -261,12 +261,6 @@ Result<void> SceneBooks::makeFrameBuffers(const PlanData& plan) {
       replace(history_, *made);
     }
   }
-  if (culls && !counters_.exists()) {
-    if (Result<void> made = make(counters_, BufferRole::counters,
-                                 sizes().requirement(BufferRole::counters, 0, limits_));
-        !made)
-      return made;
-  }
   if (!culls && resultCopies_.empty()) return {};
   SceneBufferMemory& back = nextReadBack().buffer;  // the frame that used it last is complete
   BufferRequirement needed = sizes().requirement(BufferRole::readBack, 0, limits_);
@@ -287,7 +281,6 @@ void SceneBooks::nameBuffers() {
     buffers[role] = buffers[BufferRole::positions];
   name(BufferRole::tables, tables_);
   name(BufferRole::history, history_.now);
-  name(BufferRole::counters, counters_);
   name(BufferRole::readBack, nextReadBack().buffer);
   buffers[BufferRole::visibility] = {visibilityBuffer, 0, slotCapacity_ * 4};
   buffers.poses.clear();

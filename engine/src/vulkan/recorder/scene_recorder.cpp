@@ -86,8 +86,6 @@ const char* nameOf(BufferRole role) {
       return "dermis results";
     case BufferRole::history:
       return "dermis history";
-    case BufferRole::counters:
-      return "dermis counters";
     case BufferRole::tables:
       return "dermis tables";
     case BufferRole::readBack:
