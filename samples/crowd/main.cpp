@@ -80,7 +80,7 @@ struct FigureState {
   bool teleports = false;  ///< its pose is unrelated to the pose of the last frame
   bool isInView = false;   ///< neither behind the camera nor too far away
   std::uint32_t updateInterval = 1;
-  double x = 0, z = 0;  ///< where it stands
+  double x = 0, z = 0;  ///< where it stands, in radii of the world
 };
 
 /// It turns in the middle and moves from side to side.
@@ -97,7 +97,38 @@ std::uint64_t clockOf(std::uint32_t figure, std::uint64_t frame, std::uint32_t s
   return frame + std::uint64_t{figure} * spread;
 }
 
-FigureState stateOf(const Character& character, std::uint32_t figure, std::uint32_t figures,
+/// How far a figure reaches sideways from where it stands, in any pose of its clips. Joint matrices
+/// are enough to know: nothing is skinned.
+double reachOf(const Character& character) {
+  // [crowd-bounds]
+  float reach = 0;
+  for (const Part& part : character.parts()) {
+    const std::uint32_t joints = character.jointCounts()[part.skin];
+    const JointBounds bounds = must(jointBounds(part.primitive.mesh(), joints));
+    for (PoseKey key; key.clip < character.clipCount(); ++key.clip) {
+      for (key.tick = 0; key.tick < character.tickCount(key.clip); ++key.tick) {
+        const Box box =
+            skinnedBounds(bounds, character.pose(key, part.skin), InstanceDescription().method);
+        reach = std::max({reach, -box.min[0], box.max[0], -box.min[2], box.max[2]});
+      }
+    }
+  }
+  // [/crowd-bounds]
+  return reach;
+}
+
+/// A disk in which a figure stands for each square meter.
+struct World {
+  World(const Character& character, std::uint32_t figureCount)
+      : figures(figureCount),
+        radius(std::sqrt(figureCount / std::numbers::pi) + 1),
+        reach(reachOf(character) / radius) {}
+  std::uint32_t figures;
+  double radius;  ///< meters
+  double reach;   ///< of a figure, in radii
+};
+
+FigureState stateOf(const Character& character, const World& world, std::uint32_t figure,
                     std::uint64_t frame) {
   constexpr std::uint32_t awayPeriod = 90, awayFrames = 5, awaySpread = 37;
   constexpr std::uint32_t jumpPeriod = 131, jumpSpread = 53;
@@ -116,14 +147,14 @@ FigureState stateOf(const Character& character, std::uint32_t figure, std::uint3
   // Figures stand in a sunflower spiral (Vogel 1979) of radius 1.
   const Walker camera(frame);
   const double angle = std::numbers::pi * (3 - std::sqrt(5.0)) * figure;
-  const double radius = std::sqrt((figure + 0.5) / figures);
+  const double radius = std::sqrt((figure + 0.5) / world.figures);
   state.x = radius * std::cos(angle);
   state.z = radius * std::sin(angle);
   const double x = state.x - camera.x, z = state.z, distance = std::hypot(x, z);
   const double ahead = x * std::cos(camera.turn) + z * std::sin(camera.turn);
   state.updateInterval = distance < 0.3 ? 1 : distance < 0.6 ? 2 : distance < 0.9 ? 4 : 8;
-  // A figure just behind the camera may still cast a shadow into the picture.
-  state.isInView = distance < 1.3 && ahead > -2 / std::sqrt(figures);
+  // A figure up to a meter behind the camera may still cast a shadow into the picture.
+  state.isInView = distance < 1.3 + world.reach && ahead > -1 / world.radius - world.reach;
   return state;
 }
 
@@ -188,7 +219,11 @@ vulkan::SceneRecorder createOnDevice(const vulkan::Context& context, const Chara
 class Crowd {
  public:
   Crowd(Scene& scene, const Character& character, const Options& options)
-      : scene_(&scene), character_(&character), options_(&options), figures_(options.figures) {
+      : scene_(&scene),
+        character_(&character),
+        options_(&options),
+        world_(character, options.figures),
+        figures_(options.figures) {
     for (const Part& part : character.parts())
       meshes_.push_back(must(scene_->addMesh(part.packed)));
   }
@@ -202,6 +237,7 @@ class Crowd {
   }
 
   Scene& scene() { return *scene_; }
+  const World& world() const { return world_; }
   std::span<const Figure> figures() const { return figures_; }
   std::span<const MeshHandle> meshes() const { return meshes_; }  ///< by part
   /// How often there was no room for a figure.
@@ -241,7 +277,7 @@ class Crowd {
     bool hasGaps = false;
     for (std::uint32_t index = 0; index < figures_.size(); ++index) {
       Figure& figure = figures_[index];
-      figure.now = stateOf(*character_, index, options_->figures, frame);
+      figure.now = stateOf(*character_, world_, index, frame);
       if (!figure.isThere() || figure.now.isPresent) continue;
       remove(figure);
       hasGaps = true;
@@ -282,6 +318,7 @@ class Crowd {
   Scene* scene_;
   const Character* character_;
   const Options* options_;
+  World world_;
   std::vector<MeshHandle> meshes_;  ///< by part
   std::vector<Figure> figures_;
   std::uint64_t refusals_ = 0;
@@ -514,10 +551,10 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
   recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
 }
 
-/// The parts of the figures in view, in the world: a figure stands for each square meter.
+/// The parts of the figures in view, in the world.
 std::vector<crowd::Drawn> drawnParts(const Crowd& crowd) {
   const auto figures = crowd.figures();
-  const double radius = std::sqrt(static_cast<double>(figures.size()) / std::numbers::pi) + 1;
+  const double radius = crowd.world().radius;
   std::vector<crowd::Drawn> drawn;
   for (std::uint32_t number = 0; number < figures.size(); ++number) {
     const Figure& figure = figures[number];
@@ -535,9 +572,9 @@ std::vector<crowd::Drawn> drawnParts(const Crowd& crowd) {
 }
 
 /// Above the place of the camera, looking along its direction and down.
-glm::mat4 viewOf(std::uint32_t figures, std::uint64_t frame) {
+glm::mat4 viewOf(const World& world, std::uint64_t frame) {
   const Walker camera(frame);
-  const float radius = std::sqrt(static_cast<float>(figures) / std::numbers::pi_v<float>) + 1;
+  const auto radius = static_cast<float>(world.radius);
   const glm::vec3 ahead(std::cos(camera.turn), -0.25, std::sin(camera.turn));
   const glm::vec3 place(radius * static_cast<float>(camera.x), 2.6f, 0);
   return crowd::viewProjection(place - glm::vec3(2 * ahead.x, 0, 2 * ahead.z), ahead);
@@ -578,7 +615,7 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
     }
     if (painter && frame == options.frames) {
       painter->record(commandBuffer, crowd.scene(), recorder.outputBuffer(), drawnParts(crowd),
-                      viewOf(options.figures, frame));
+                      viewOf(crowd.world(), frame));
     }
     must(loop.submit());
   }
