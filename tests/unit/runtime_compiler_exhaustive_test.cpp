@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "dermis/compilers.h"
+#include "dermis/vulkan/context.h"
 #include "dermis_kernels.h"
 #include "dermis_kernels_recipes.h"
 #include "test_paths.h"
