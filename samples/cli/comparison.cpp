@@ -14,6 +14,7 @@
 #include "dermis/verify.h"
 #include "dermis/vulkan/context.h"
 #include "kernel_instructions.h"
+#include "kit/bench/pipeline_statistics.h"
 #include "kit/timed_batches.h"
 #include "scene_skinner.h"
 
@@ -242,7 +243,7 @@ class MethodComparer {
     if (Result<void> timed = repeat([&](std::size_t method) { return batches->skin(method); });
         !timed)
       return timed;
-    countInstructions(pipelines, PipelineStatistics::create(*open.device).get());
+    countInstructions(pipelines, samples::PipelineStatistics::create(*open.device).get());
     return {};
   }
 
@@ -337,11 +338,15 @@ class MethodComparer {
 
   /// Counts from the driver, if it counts the instructions of every kernel.
   void countInstructions(const std::vector<vulkan::PipelineDescription>& pipelines,
-                         const PipelineStatistics* statistics) {
+                         const samples::PipelineStatistics* statistics) {
     std::vector<std::optional<std::uint64_t>> counts;
     if (statistics != nullptr) {
-      for (const vulkan::PipelineDescription& pipeline : pipelines)
-        counts.push_back(statistics->instructionCount(pipeline));
+      for (const vulkan::PipelineDescription& pipeline : pipelines) {
+        if (const auto kernel = statistics->compile(pipeline))
+          counts.push_back(kernel->instructionCount());
+        else
+          counts.push_back(std::nullopt);
+      }
     }
     comparison_.instructionSource = InstructionSource::driver;
     if (counts.empty() || std::ranges::any_of(counts, [](const auto& count) { return !count; })) {

@@ -17,6 +17,7 @@
 #   mutants      over two hundred mistakes planted in the engine, one at a time; a test must catch each (tests/mutants)
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
+#   compilers    what the compilers of AMD's GPUs make of the kernels, without a GPU: more instructions than before, spills
 #   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
 #   exhaustive   every combination of methods and formats, and every real model, on the device
 #   packages     ways to use Dermis that compile it again: as a subproject, from its source package, with another compiler
@@ -32,7 +33,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mutants mesa speed gpu exhaustive packages golden showcase programs"
+parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mutants mesa speed compilers gpu exhaustive packages golden showcase programs"
 passed=tests/nightly/passed.tsv
 figures=build/nightly/figures # what a part counted
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
@@ -220,6 +221,15 @@ part_speed() {
   export $settings
   build/ci/samples/cli/dermis bench --json build/nightly/bench-mesa.json
   check_speed build/nightly/bench-mesa.json 1.2 1.4 0.5
+}
+
+part_compilers() {
+  table=build/ci/tests/bench/dermis_compiler_table
+  build ci dermis_compiler_table
+  tests/bench/compilers.py "$table"
+  settings=$(./tests/nightly/unpack_mesa.sh build/nightly/mesa)
+  # shellcheck disable=SC2086 # NAME=VALUE words
+  env $settings VK_DRIVER_FILES="$PWD/build/nightly/mesa/radeon.json" tests/bench/compilers.py "$table" --goals navi21 navi31
 }
 
 part_gpu() {

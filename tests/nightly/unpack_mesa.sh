@@ -1,9 +1,9 @@
 #!/bin/sh
-# Unpacks the lavapipe of this Debian release's backports into a folder, without installing it.
+# Unpacks Mesa's Vulkan drivers of this Debian release's backports into a folder, without installing it.
 #
 #   tests/nightly/unpack_mesa.sh FOLDER
 #
-# Prints the two settings that make programs use it. Packages come from the mirror that apt on this machine uses; packages that are
+# Prints the two settings that make programs use lavapipe; radeon.json in FOLDER names the driver for AMD. Packages come from the mirror that apt on this machine uses; packages that are
 # already installed are used as they are. If FOLDER already contains a driver, only prints.
 set -eu
 mkdir -p "$1"
@@ -37,7 +37,10 @@ if [ ! -s "$icd" ]; then
 
   driver=$(find "$folder" -name libvulkan_lvp.so | head -n 1)
   [ -n "$driver" ] || { echo "unpack_mesa: the packages of $suite hold no lavapipe" >&2; exit 1; }
-  printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$driver" >"$icd"
+  for name in "$driver" "$(dirname "$driver")/libvulkan_radeon.so"; do
+    case $name in *radeon*) to=$folder/radeon.json ;; *) to=$icd ;; esac
+    printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$name" >"$to"
+  done
 fi
 
 echo "VK_DRIVER_FILES=$icd"
