@@ -62,6 +62,35 @@ class PlannedScene {
     must(plan());
     must(commit());
   }
+  /// Vulkan does not order copies that no barrier separates: none may write what another reads or
+  /// writes.
+  void expectCopiesApart() const {
+    std::vector<BufferPart> written, read;
+    const auto overlap = [](const BufferPart& a, const BufferPart& b) {
+      return a.buffer == b.buffer && a.offset < b.offset + b.size && b.offset < a.offset + a.size;
+    };
+    const auto expectApart = [&](const BufferPart& part, const std::vector<BufferPart>& others) {
+      for (const BufferPart& other : others)
+        EXPECT_FALSE(overlap(part, other)) << "buffer " << part.buffer << ", at " << part.offset;
+    };
+    for (const Command& command : planned.commands()) {
+      if (std::holds_alternative<BarrierCommand>(command)) {
+        written.clear();
+        read.clear();
+      }
+      BufferPart to;
+      if (const auto* upload = std::get_if<UploadCommand>(&command)) to = upload->to;
+      if (const auto* clear = std::get_if<ClearCommand>(&command)) to = clear->part;
+      if (const auto* copy = std::get_if<CopyCommand>(&command)) {
+        to = {copy->to, copy->toOffset, copy->size};
+        read.push_back({copy->from, copy->fromOffset, copy->size});
+        expectApart(read.back(), written);
+      }
+      expectApart(to, written);
+      expectApart(to, read);
+      written.push_back(to);
+    }
+  }
   /// Of the buffer with this role, the newest one; 0 if there is none.
   std::uint64_t sizeOf(BufferRole role) const {
     std::uint64_t size = 0;

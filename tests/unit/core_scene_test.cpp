@@ -51,6 +51,7 @@ struct OneInstance {
   void plan(std::uint64_t frame, std::uint64_t completed) {
     must(scene.beginFrame(frame, completed));
     must(owner.plan());
+    owner.expectCopiesApart();
   }
   void record(std::uint64_t frame, std::uint64_t completed) {
     plan(frame, completed);
@@ -451,6 +452,33 @@ TEST(Scene, AfterAnAbandonedFrameEverythingIsSkinnedAndItsMotionRestarts) {
   must(one.scene.change({.instance = hidden, .visible = true}));
   must(one.owner.plan());
   EXPECT_EQ(flagsOf(one.planned), std::vector{std::uint32_t{abi::INSTANCE_RESTARTS}});
+}
+
+// A new pose that is written, too, is uploaded once: two uploads of it would have no order.
+TEST(Scene, APoseIsUploadedOnce) {
+  PlannedScene owner;
+  owner.mapsPoses = false;
+  must(owner.tryToCreate(smallScene()));
+  Scene& scene = owner.scene();
+  const auto uploads = [&](std::uint64_t frame, bool isAbandoned) {
+    must(owner.plan());
+    owner.expectCopiesApart();
+    const auto count = std::ranges::count(namesOf(owner), "upload to poses");
+    must(owner.commit());
+    if (isAbandoned) must(scene.abandonFrame(frame));
+    return count;
+  };
+  const PoseHandle early = must(scene.addPose(4));
+  must(scene.writePose(early));
+  must(scene.beginFrame(1, 0));
+  const PoseHandle late = must(scene.addPose(4));
+  for (const PoseHandle pose : {early, late, late}) must(scene.writePose(pose));
+  EXPECT_EQ(uploads(1, true), 2);
+  for (const PoseHandle pose : {early, late}) must(scene.writePose(pose));
+  EXPECT_EQ(uploads(1, false), 2);
+  must(scene.beginFrame(2, 1));
+  must(scene.writePose(late));
+  EXPECT_EQ(uploads(2, false), 1);
 }
 
 // Also where it grew again between, and where poses are not mapped.

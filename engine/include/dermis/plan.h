@@ -29,9 +29,9 @@ struct DeviceLimits {
   std::uint32_t minStorageBufferOffsetAlignment = 256;
   std::uint32_t maxWorkgroupCountX = 65535;
   std::uint32_t maxWorkgroupCountY = 65535;
-  /// Maximum storage buffers of one kernel. With fewer than `storageBuffersWanted`, all attributes
-  /// of a job must go to one buffer, as if `separateRanges` were false. Bounds and snorm16
-  /// positions are then not available.
+  /// Maximum storage buffers of one kernel: maxPerStageDescriptorStorageBuffers. With fewer than
+  /// `storageBuffersWanted`, all attributes of a job must go to one buffer, as if `separateRanges`
+  /// were false. Bounds and snorm16 positions are then not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
   /// Whether one dispatch may bind a different window of the output buffer for each attribute. If
   /// false, and the output buffer is larger than a storage buffer range, the attributes of each
@@ -43,7 +43,7 @@ struct DeviceLimits {
   /// batch with `Method::linear` poses, through uniform texel buffers, and store an attribute, or
   /// all of a vertex, at once; both are faster on lavapipe. Requires the features `shaderInt64` and
   /// `scalarBlockLayout`, and that a uniform texel buffer of 4-byte texels can hold a whole storage
-  /// buffer range.
+  /// buffer range: `maxStorageBufferRange` is at most 4 × maxTexelBufferElements.
   bool texelBuffers = false;
   /// Whether kernels collect interleaved vertices in workgroup memory, so that consecutive
   /// invocations store consecutive blocks of 16 bytes. Needs no device feature. Used only if
@@ -266,23 +266,27 @@ struct DispatchCommand {
   std::uint32_t groupCountY = 0;  ///< the third count is 1
   /// Workgroups that do work. `groupCountX` × `groupCountY` may be a little larger. 0 if indirect.
   std::uint32_t workgroupCount = 0;
-  /// If indirect: where the VkDispatchIndirectCommand is; its buffer is that of `bindings[0]`.
+  /// If indirect: where the VkDispatchIndirectCommand is, in bytes from the beginning of the buffer
+  /// of `bindings[0]`.
   std::optional<std::uint64_t> indirectOffset;
   /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
   /// SkinPush or VisibilityPush of shaders/abi.h.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
-  /// Valid as long as the commands. They include what the kernel declares and does not use.
+  /// Valid as long as the commands. They are all that the kernel declares: a descriptor of a slot
+  /// that is not listed need not be written.
   std::span<const Binding> bindings;
 };
 
-/// Bytes of the CPU that are written to a buffer: to its mapping, or by way of a staging buffer.
+/// Bytes of the CPU that are written to a buffer, by way of a staging buffer and vkCmdCopyBuffer.
+/// Uploads, copies and clears between two barriers do not depend on each other. The engine may
+/// write a mapping instead, if earlier frames that use the buffer are complete.
 struct UploadCommand {
   BufferPart to;
   std::span<const std::byte> bytes;  ///< as many as the part has; valid as long as the commands
 };
 
-/// vkCmdCopyBuffer. Consecutive copies do not depend on each other.
+/// vkCmdCopyBuffer.
 struct CopyCommand {
   std::uint32_t from, to;                                ///< numbers of buffers
   std::uint64_t fromOffset = 0, toOffset = 0, size = 0;  ///< bytes

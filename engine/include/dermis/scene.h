@@ -98,7 +98,9 @@ struct InstanceDescription {
   /// The instance is skinned every N-th frame; N is at least 1. If it was due in a frame that was
   /// abandoned, or whose number was skipped, it is skinned in the next one. Instances with the same
   /// pose and interval are skinned in the same frames. Different poses are spread over the frames.
-  /// A teleport, another mesh and becoming visible take effect at once.
+  /// A teleport, another mesh and becoming visible take effect at once; but the CPU does not know
+  /// that the GPU found an instance visible, so with `culledOnGpu` it may then show the pose of
+  /// the last frame in which it was due.
   std::uint32_t updateInterval = 1;
   /// Whether a word of the visibility buffer, too, decides in each frame if the instance is
   /// visible: 0 means invisible. `InstanceChange::visible` must be true as well. An invisible
@@ -134,7 +136,8 @@ struct InstanceChange {
   std::optional<std::span<const MorphWeight>> morphs = {};
 };
 
-/// Sets both `InstanceChange::visible` and `InstanceChange::updateInterval` of an instance.
+/// Sets both `InstanceChange::visible` and `InstanceChange::updateInterval` of an instance: state
+/// the interval anew.
 struct InstanceVisibility {
   InstanceHandle instance = {};
   bool visible = true;
@@ -344,10 +347,13 @@ class DERMIS_CORE_API Scene {
   /// Where the skinned vertices of an instance are. The place is known from `addInstance` on.
   Result<InstanceOutput> output(InstanceHandle instance) const;
   /// Fills `draws`, one for each of `instances`, for one indirect draw from the beginning of the
-  /// output buffer. `indices` are the ranges of all meshes, by `MeshHandle::index`. Fails with
-  /// `invalidArgument` if the sizes of both lists differ, for a mesh without a range, for a layout
-  /// that is not interleaved and for one with another stride than the first; with `limitExceeded`
-  /// for a first vertex beyond 2³¹ − 1. The message names the instance by its position in the list.
+  /// output buffer. It needs the features drawIndirectFirstInstance and multiDrawIndirect. For
+  /// instances that are culled on the GPU, let the pass that culls set `instanceCount`: what it
+  /// finds visible is skinned in the same frame, while the count here lags behind. `indices` are
+  /// the ranges of all meshes, by `MeshHandle::index`. Fails with `invalidArgument` if the sizes of
+  /// both lists differ, for a mesh without a range, for a layout that is not interleaved and for
+  /// one with another stride than the first; with `limitExceeded` for a first vertex beyond 2³¹
+  /// − 1. The message names the instance by its position in the list.
   Result<void> indexedDraws(std::span<const InstanceHandle> instances,
                             std::span<const IndexRange> indices,
                             std::span<IndexedDraw> draws) const;
@@ -362,7 +368,8 @@ class DERMIS_CORE_API Scene {
   /// `InstanceResult::box` is empty.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
 
-  /// The index of the instance's word in the visibility buffer (`culledOnGpu`).
+  /// The index of the instance's word in the visibility buffer (`culledOnGpu`), as long as it
+  /// lives. Words of no such instance are not read.
   Result<std::uint32_t> visibilityIndex(InstanceHandle instance) const;
   /// Number of words in the visibility buffer: larger than every `visibilityIndex`. Grows when
   /// instances are added.
@@ -392,7 +399,7 @@ class DERMIS_CORE_API Scene {
 //     commands.commit();
 //     draw from the buffer `commands.outputBuffer()` at scene.output(instance)
 //
-// Buffers have numbers, which the scene chooses. samples/own_rhi is such an engine.
+// Buffers have numbers, which the scene chooses. The sample own_rhi of Dermis is such an engine.
 
 /// A buffer that a scene asks for.
 struct SceneBuffer {
@@ -413,7 +420,8 @@ struct SceneMemory {
   /// Creates a buffer, or reserves a part of one that the engine has. Returns the address of its
   /// first byte if it is mapped, otherwise null. If poses are not mapped, the plan uploads them; if
   /// a read-back buffer is not, the engine calls `SceneCommands::readBack`. If it fails, the scene
-  /// asks for a smaller buffer, or the function of the scene fails with the same error.
+  /// asks for a smaller buffer, or the function of the scene fails with the same error. Memory for
+  /// `readBack` is host-visible even so.
   Result<void*> (*create)(void* user, const SceneBuffer& buffer) = nullptr;
   /// Releases a buffer that no frame in flight uses. Buffers that remain when the owner is
   /// destroyed are not released.

@@ -22,7 +22,7 @@ using Double4 = std::array<double, 4>;  ///< x, y, z, w
 
 /// How near a float32 result must be to the reference at one vertex: the accuracy contract of
 /// docs/accuracy.md, for the method, the pose and this vertex. Formats add their own bounds
-/// (`positionFormatBound` and others in accuracy.h).
+/// (`positionFormatBound` and others below).
 struct VertexBounds {
   double position = 0;  ///< maximum distance between positions, in the units of the pose
   /// Maximum distance between unit normals. If negative, the normal must only have unit length.

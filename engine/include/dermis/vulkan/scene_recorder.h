@@ -90,7 +90,8 @@ struct SceneRecorderDescription {
   BufferRange gpuPoses;  ///< for poses that a GPU pass of the engine writes
   BufferRange output;
   /// What the engine uses the output buffer for, if the recorder creates it. For example
-  /// `vertexBufferUsage`, or that with `buildInputUsage` (drawing.h).
+  /// `vertexBufferUsage`, or that with `buildInputUsage` (drawing.h) or, to read vertices back,
+  /// VK_BUFFER_USAGE_TRANSFER_SRC_BIT. Dermis adds what it needs itself.
   VkBufferUsageFlags outputUsage = vertexBufferUsage;
 
   /// Create and destroy all other buffers. Set both functions or none. Buffers are created by
@@ -110,7 +111,9 @@ struct FrameDescription {
   /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
   /// holds `Scene::visibilityCount` words of 4 bytes. An instance is visible if the word at its
   /// `visibilityIndex` is not 0. The engine's culling writes them on the GPU before `record`, with
-  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between.
+  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between; or the CPU writes
+  /// them through a mapping before the submission, without a barrier, to a buffer that no frame in
+  /// flight uses.
   VkBuffer visibility{};
   /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
   VkDeviceSize visibilityOffset = 0;

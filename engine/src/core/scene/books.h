@@ -99,7 +99,8 @@ struct ScenePose {
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
   /// flight.
   std::uint32_t slot = 0;
-  std::uint64_t poseFrame = 0;  ///< the frame that it was last written in
+  std::uint64_t poseFrame = 0;   ///< the frame that it was last written in
+  std::uint64_t uploadedBy = 0;  ///< the plan that lists its upload
   std::uint64_t version = 1;
   std::array<Form, paletteFormCount> forms;
   std::uint32_t users = 0;

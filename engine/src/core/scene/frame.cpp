@@ -245,8 +245,10 @@ void SceneBooks::listUploads() {
         {{meshStore_.buffer.now.number, bytes.offset, bytes.size}, upload.bytes.bytes()});
   }
   for (const PoseHandle handle : poseUploads_) {
-    const ScenePose* pose = poses_.find(handle);
-    if (pose == nullptr) continue;
+    ScenePose* pose = poses_.find(handle);
+    // It may be listed twice: as new, written, or abandoned.
+    if (pose == nullptr || pose->uploadedBy == planNumber_) continue;
+    pose->uploadedBy = planNumber_;
     const std::span<const std::byte> bytes = std::as_bytes(matricesOf(*pose));
     uploads_.push_back(
         {{poseBuffers_[pose->buffer].buffer.number, offsetOf(*pose), bytes.size()}, bytes});
