@@ -39,8 +39,8 @@ vec4 quaternionOfRows(vec3 r0, vec3 r1, vec3 r2) {
 
 // v rotated by a quaternion q = (r, w) of any length except 0: v + factor r × (r × v + w v). `factor` is 2 / |q|².
 vec3 rotateBy(vec4 q, float factor, vec3 v) {
-  precise vec3 inner = cross3(q.xyz, v) + q.w * v;
-  precise vec3 turned = v + cross3(q.xyz, inner) * factor;
+  precise vec3 inner = fma(vec3(q.w), v, cross3(q.xyz, v));
+  precise vec3 turned = fma(cross3(q.xyz, inner), vec3(factor), v);
   return turned;
 }
 

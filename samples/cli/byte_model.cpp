@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <span>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "abi.h"
 #include "dermis/layout.h"
@@ -32,10 +31,6 @@ bool isArithmetic(std::uint32_t opcode) {
          opcode == opVectorTimesScalar || opcode == opExtInst;
 }
 
-bool isProduct(std::uint32_t opcode) {
-  return opcode == opFMul || opcode == opVectorTimesScalar;
-}
-
 struct Instruction {
   std::uint32_t opcode = 0;
   std::span<const std::uint32_t> operands;
@@ -53,34 +48,19 @@ std::vector<Instruction> instructionsOf(std::span<const std::uint32_t> words) {
   return all;
 }
 
-struct Operations {
-  double all = 0, fused = 0;
-};
-
 /// Counts the operations of a kernel with all functions inlined into `main`. It has a loop over
 /// instances; on CPU devices three nested loops, over vertices, runs and instances. Code outside
 /// them runs once per vertex and invocation; loops inside them run for each influence except the
-/// first.
-Operations countOperations(std::span<const std::uint32_t> words, std::size_t instanceLoops) {
+/// first. An `fma` counts once.
+double countOperations(std::span<const std::uint32_t> words, std::size_t instanceLoops) {
   const std::vector<Instruction> instructions = instructionsOf(words);
   std::unordered_map<std::uint32_t, double> floats;  // of types
-  std::unordered_map<std::uint32_t, int> uses;
-  std::unordered_set<std::uint32_t> products, summed;
   for (const auto& [opcode, operands] : instructions) {
     if (opcode == opTypeFloat) floats[operands[0]] = 1;
     if (opcode == opTypeVector && floats.contains(operands[1]))
       floats[operands[0]] = static_cast<double>(operands[2]) * floats[operands[1]];
-    if (isProduct(opcode)) products.insert(operands[1]);
-    for (std::size_t operand = 2; operand < operands.size(); ++operand) ++uses[operands[operand]];
-    if (opcode != opFAdd && opcode != opFSub) continue;
-    // A fused operation contains a sum and one of its products.
-    for (const std::uint32_t term : {operands[2], operands[3]}) {
-      if (!products.contains(term)) continue;
-      summed.insert(term);
-      break;
-    }
   }
-  Operations operations;
+  double operations = 0;
   std::vector<std::uint32_t> loops;
   bool isInFunction = false;
   for (const auto& [opcode, operands] : instructions) {
@@ -96,9 +76,7 @@ Operations countOperations(std::span<const std::uint32_t> words, std::size_t ins
     const double times = loops.size() < instanceLoops   ? 1.0 / instancesEach
                          : loops.size() > instanceLoops ? influences - 1
                                                         : 1;
-    operations.all += times * type->second;
-    const bool isFused = summed.contains(operands[1]) && uses[operands[1]] == 1;
-    if (!isFused) operations.fused += times * type->second;
+    operations += times * type->second;
   }
   return operations;
 }
@@ -149,9 +127,7 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   model.meshRead =
       (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
   model.paletteRead = influences * (method == Method::linear ? 48 : 32);
-  const Operations operations = countOperations(spirv, pipeline->texelBuffers != 0 ? 3 : 1);
-  model.operations = operations.all;
-  model.fusedOperations = operations.fused;
+  model.operations = countOperations(spirv, pipeline->texelBuffers != 0 ? 3 : 1);
   return model;
 }
 
@@ -208,18 +184,16 @@ bool printByteModels() {
     fmt::print("{}: L2 {} TB/s, L1 {} TB/s, {} x 10^12 float32 operations per second (assumed)\n",
                gpu.name, gpu.cache, gpu.firstLevel, gpu.operations);
   }
-  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7} {:>7}", "method, formats, stores", "written",
-             "stored", "mesh", "palette", "ops", "fused");
+  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7}", "method, formats, stores", "written",
+             "stored", "mesh", "palette", "ops");
   for (const GpuSpeed& gpu : gpuSpeeds()) fmt::print(" {:>21}", gpu.name);
-  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7} {:>7}", "", "bytes", "bytes", "bytes", "bytes",
-             "", "");
+  fmt::print("\n{:<52} {:>8} {:>8} {:>6} {:>8} {:>7}", "", "bytes", "bytes", "bytes", "bytes", "");
   for (std::size_t gpu = 0; gpu < gpuSpeeds().size(); ++gpu)
     fmt::print(" {:>21}", "10^9 vertices/s");
   fmt::print("\n");
   for (const ByteModel& model : *models) {
-    fmt::print("{:<52} {:>8} {:>8} {:>6} {:>8} {:>7.0f} {:>7.0f}", model.name, model.written,
-               model.stored, model.meshRead, model.paletteRead, model.operations,
-               model.fusedOperations);
+    fmt::print("{:<52} {:>8} {:>8} {:>6} {:>8} {:>7.0f}", model.name, model.written, model.stored,
+               model.meshRead, model.paletteRead, model.operations);
     for (const GpuSpeed& gpu : gpuSpeeds()) {
       const ByteBound bound = boundOf(model, gpu);
       fmt::print(" {:>10.1f} {:<10}", bound.verticesPerSecond / 1e9, bound.by);

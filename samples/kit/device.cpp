@@ -106,6 +106,7 @@ DeviceInfo describe(const VulkanFunctions& functions, VkPhysicalDevice device) {
     functions.GetPhysicalDeviceFeatures2(device, &features);
     info.pipelineStatistics = features.features.pipelineStatisticsQuery == VK_TRUE;
     info.int64 = features.features.shaderInt64 == VK_TRUE;
+    info.float64 = features.features.shaderFloat64 == VK_TRUE;
     info.indirectDraws = features.features.multiDrawIndirect == VK_TRUE &&
                          features.features.drawIndirectFirstInstance == VK_TRUE;
     info.scalarBlockLayout = scalarBlockLayout.scalarBlockLayout == VK_TRUE;
@@ -274,6 +275,7 @@ Result<void> Device::createDevice(const DeviceOptions& options) {
   }
   features_.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   features_.features.shaderInt64 = info_.int64 ? VK_TRUE : VK_FALSE;
+  if (options.float64 && info_.float64) features_.features.shaderFloat64 = VK_TRUE;
   if (options.graphics && info_.indirectDraws)
     features_.features.multiDrawIndirect = features_.features.drawIndirectFirstInstance = VK_TRUE;
   if (options.pipelineStatistics && info_.pipelineStatistics)

@@ -26,6 +26,7 @@ struct DeviceInfo {
   std::uint32_t storageBuffersPerStage = 0;
   bool pushDescriptors = false;
   bool int64 = false;              ///< kernels can use 64-bit integers
+  bool float64 = false;            ///< shaders can compute in double precision
   bool scalarBlockLayout = false;  ///< kernels can store up to 32 bytes at once
   bool accelerationStructures = false;
   bool rayQueries = false;
@@ -45,6 +46,7 @@ struct DeviceOptions {
                                 ///< queries if the device has them
   bool graphics = false;        ///< requires a graphics queue; enables `indirectDraws`
   /// Enable queries that count invocations if the device has them.
+  bool float64 = false;  ///< whether to enable `DeviceInfo::float64`
   bool pipelineStatistics = false;
   vulkan::KernelSource kernels;  ///< of the context; empty: the library's
   /// Instance extensions for the surface of a window. If there are any, VK_KHR_swapchain is

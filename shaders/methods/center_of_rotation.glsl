@@ -24,20 +24,20 @@ vec3 linearPoint(Influences influences, Pose pose, vec3 point) {
 
 // v' = Q S (v − c) + Σ w_j (R_j S_j c + t_j), where Q and S are blended.
 Vertex skinCenterOfRotation(Vertex vertex, Influences influences, Pose pose, vec3 center) {
-  Blend blend = blendJoints(influences, pose);
   precise vec3 lever = vertex.position - center;
   vertex.position = lever;
   Scaled scaled = scaleVertex(vertex, influences, pose);
+  Blend blend = blendJoints(influences, pose);
   return turnVertex(scaled, blend.real, turningFactor(blend.real), linearPoint(influences, pose, center));
 }
 
 // Dual quaternions and centers of rotation rotate a vertex in the same way, and differ only in where the center goes. Adding a part
 // of that difference removes a part of the bulge.
 Vertex skinBulgeControlled(Vertex vertex, Influences influences, Pose pose, vec3 center, float strength) {
+  Scaled scaled = scaleVertex(vertex, influences, pose);
   Blend blend = blendJoints(influences, pose);
   float factor = turningFactor(blend.real);
   vec3 translation = translationOf(blend.real, blend.dual, factor);
-  Scaled scaled = scaleVertex(vertex, influences, pose);
   vec3 scaledCenter = scalePosition(scaled.part, center);
   precise vec3 bulged = rotateBy(blend.real, factor, scaledCenter) + translation;
   precise vec3 drawn =

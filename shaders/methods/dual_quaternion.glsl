@@ -22,8 +22,8 @@ float signedWeight(vec4 pivot, vec4 rotation, float weight) { return dot4(pivot,
 Blend addJoint(Blend blend, vec4 pivot, float weight, Pose pose, uint joint) {
   vec4 rotation = paletteRotation(pose.palette, joint);
   float towardsPivot = signedWeight(pivot, rotation, weight);
-  precise vec4 real = blend.real + towardsPivot * rotation;
-  precise vec4 dual = blend.dual + towardsPivot * paletteDual(pose.palette, joint);
+  precise vec4 real = fma(vec4(towardsPivot), rotation, blend.real);
+  precise vec4 dual = fma(vec4(towardsPivot), paletteDual(pose.palette, joint), blend.dual);
   return Blend(real, dual);
 }
 
@@ -41,8 +41,8 @@ Blend blendJoints(Influences influences, Pose pose) {
 // vertex scales, it is exactly the identity, so the vertex has the same bits as with a palette in which no joint scales.
 ScaleShear addScaleShear(ScaleShear blend, ScaleShear pivot, float weight, Pose pose, uint joint) {
   ScaleShear part = paletteScaleShear(pose, joint);
-  precise vec3 diagonal = blend.diagonal + weight * (part.diagonal - pivot.diagonal);
-  precise vec3 mixed = blend.mixed + weight * (part.mixed - pivot.mixed);
+  precise vec3 diagonal = fma(vec3(weight), part.diagonal - pivot.diagonal, blend.diagonal);
+  precise vec3 mixed = fma(vec3(weight), part.mixed - pivot.mixed, blend.mixed);
   return ScaleShear(diagonal, mixed);
 }
 
@@ -107,14 +107,16 @@ Vertex turnVertex(Scaled scaled, vec4 real, float factor, vec3 translation) {
 
 // The translation of a dual quaternion of any length except 0. `factor` is 2 / |real|², so `real` need not be normalized.
 vec3 translationOf(vec4 real, vec4 dual, float factor) {
-  precise vec3 translation = (real.w * dual.xyz - dual.w * real.xyz + cross3(real.xyz, dual.xyz)) * factor;
+  precise vec3 straight = real.w * dual.xyz;
+  precise vec3 translation = (fma(vec3(-dual.w), real.xyz, straight) + cross3(real.xyz, dual.xyz)) * factor;
   return translation;
 }
 
+// The vertex is scaled first, so that the blended quaternion takes no registers meanwhile.
 Vertex skinDualQuaternion(Vertex vertex, Influences influences, Pose pose) {
+  Scaled scaled = scaleVertex(vertex, influences, pose);
   Blend blend = blendJoints(influences, pose);
   float factor = turningFactor(blend.real);
-  Scaled scaled = scaleVertex(vertex, influences, pose);
   return turnVertex(scaled, blend.real, factor, translationOf(blend.real, blend.dual, factor));
 }
 

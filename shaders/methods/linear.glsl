@@ -33,9 +33,9 @@ struct Rows {
 };
 
 Rows addMatrix(Rows blend, float weight, Pose pose, uint joint) {
-  precise vec4 r0 = blend.r0 + weight * paletteRow(pose.palette, joint, 0u);
-  precise vec4 r1 = blend.r1 + weight * paletteRow(pose.palette, joint, 1u);
-  precise vec4 r2 = blend.r2 + weight * paletteRow(pose.palette, joint, 2u);
+  precise vec4 r0 = fma(vec4(weight), paletteRow(pose.palette, joint, 0u), blend.r0);
+  precise vec4 r1 = fma(vec4(weight), paletteRow(pose.palette, joint, 1u), blend.r1);
+  precise vec4 r2 = fma(vec4(weight), paletteRow(pose.palette, joint, 2u), blend.r2);
   return Rows(r0, r1, r2);
 }
 

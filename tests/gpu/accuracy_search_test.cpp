@@ -17,6 +17,7 @@
 #include "dermis/verify.h"
 #include "inexact_context.h"
 #include "kit/batch_runner.h"
+#include "kit/verification_product.h"
 #include "test_device.h"
 #include "worst_rig.h"
 
@@ -25,8 +26,12 @@ namespace {
 
 constexpr Arithmetic exact{"exact", {}};
 constexpr Arithmetic mixed{"mixed", {Side::mixed, Side::mixed}};
+constexpr Arithmetic fused{"fused", {.fuses = true}};
+constexpr Arithmetic fusedMixed{
+    "fused, mixed", {.division = Side::mixed, .inverseRoot = Side::mixed, .fuses = true}};
 constexpr std::array allInexact{Arithmetic{"up", {Side::up, Side::up}},
-                                Arithmetic{"down", {Side::down, Side::down}}, mixed};
+                                Arithmetic{"down", {Side::down, Side::down}}, mixed, fused,
+                                fusedMixed};
 
 class InexactTest : public DeviceTest {
  protected:
@@ -97,6 +102,41 @@ TEST_F(InexactTest, EveryVertexIsInsideItsBoundOnAnyConformingGpu) {
       }
     }
   }
+}
+
+// No test device rounds `fma` once, so that nothing else executes what most GPUs do.
+TEST_F(InexactTest, RandomCasesAreVerifiedWhereFmaRoundsOnce) {
+  Inexact inexact(device().description(), fused);
+  ASSERT_TRUE(inexact.context.ok());
+  samples::VulkanTarget target(device(), *inexact.context);
+  std::uint64_t compared = 0, exempt = 0;
+  for (const Method method : allMethods) {
+    for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
+                                    Rigidity::mirrored, Rigidity::mirroredAlongOneAxis}) {
+      for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u, 17u}) {
+        samples::RandomCase random;
+        random.method = method;
+        random.rigidity = rigidity;
+        random.vertices = 257;
+        random.joints = 40;
+        random.influences = influences;
+        random.output.layout.tangents = VertexFormat::float32x4;
+        random.output.layout.bounds = influences % 2 == 0;
+        const auto verified = samples::verifyRandomCase(target, random);
+        ASSERT_TRUE(verified.ok()) << verified.error().message;
+        for (const samples::VerifiedInstance& instance : *verified) {
+          EXPECT_TRUE(instance.passed())
+              << methodName(method) << ", " << static_cast<int>(rigidity) << ", " << influences
+              << " influences: " << instance.wrong << ", " << instance.comparison.failures
+              << " vertices outside their bounds";
+          compared += instance.comparison.compared;
+          exempt += instance.comparison.exempt.onlyFinite;
+        }
+      }
+    }
+  }
+  EXPECT_GT(changedOperations, 1000u);
+  EXPECT_LE(exempt, compared / 100);
 }
 
 double distance(const float* actual, const double* expected) {
@@ -212,6 +252,10 @@ TEST_F(AccuracySearchTest, TheWorstVerticesAreInsideTheirBounds) {
 
 TEST_F(AccuracySearchTest, TheWorstVerticesAreInsideTheirBoundsOnAnyConformingGpu) {
   expectInside(mixed, everyRange);
+}
+
+TEST_F(AccuracySearchTest, TheWorstVerticesAreInsideTheirBoundsWhereFmaRoundsOnce) {
+  expectInside(fusedMixed, everyRange);
 }
 
 TEST_F(AccuracySearchTest, TheWorstVerticesByTheNumberOfInfluences) {

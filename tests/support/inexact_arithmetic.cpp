@@ -13,6 +13,7 @@ namespace {
 enum Opcode : std::uint32_t {
   opExtInstImport = 11,
   opExtInst = 12,
+  opCapability = 17,
   opTypeInt = 21,
   opTypeFloat = 22,
   opTypeVector = 23,
@@ -21,6 +22,7 @@ enum Opcode : std::uint32_t {
   opFunction = 54,
   opLoad = 61,
   opDecorate = 71,
+  opFConvert = 115,
   opBitcast = 124,
   opSNegate = 126,
   opFNegate = 127,
@@ -40,7 +42,8 @@ enum Opcode : std::uint32_t {
   opBitwiseXor = 198,
   opBitwiseAnd = 199,
 };
-constexpr std::uint32_t glslSqrt = 31, glslInverseSqrt = 32, glslUMin = 38;
+constexpr std::uint32_t glslSqrt = 31, glslInverseSqrt = 32, glslUMin = 38, glslFma = 50;
+constexpr std::uint32_t float64 = 10;
 constexpr std::uint32_t noContraction = 42;
 constexpr std::size_t headerWords = 5;
 
@@ -64,6 +67,7 @@ class Patcher {
   std::vector<std::uint32_t> run() {
     forEachInstruction(module_, [this](std::uint32_t opcode, Words words) { note(opcode, words); });
     out_.assign(module_.begin(), module_.begin() + headerWords);
+    if (inexactness_.fuses) declareType(opCapability, {float64});
     forEachInstruction(module_, [this](std::uint32_t opcode, Words words) { copy(opcode, words); });
     out_[3] = bound_;
     return std::move(out_);
@@ -74,12 +78,13 @@ class Patcher {
  private:
   /// A type of floats, the same of unsigned integers, and constants of both.
   struct Type {
-    std::uint32_t components = 1, integer = 0;
+    std::uint32_t components = 1, integer = 0, wide = 0;
     std::map<std::uint32_t, std::uint32_t> integers, floats;
   };
 
   void note(std::uint32_t opcode, Words words) {
     if (opcode == opExtInstImport) glsl_ = words[1];
+    if (opcode == opExtInst && words[3] == glsl_ && words[4] == glslFma) fmas_.insert(words[2]);
     if (opcode == opTypeFloat && words[2] == 32) types_[float_ = words[1]].components = 1;
     if (opcode == opTypeInt && words[2] == 32 && words[3] == 0) integer_ = words[1];
     if (opcode == opTypeVector && words[2] == float_) types_[words[1]].components = words[3];
@@ -102,6 +107,9 @@ class Patcher {
       out_.insert(out_.end(), {words[0], unflushed_[words[1]], noContraction});
       return;
     }
+    if (inexactness_.fuses && opcode == opDecorate && words[2] == noContraction &&
+        fmas_.contains(words[1]))
+      return;
     if (declared_ && words.size() > 2 && unflushed_.contains(words[2]) &&
         mayBeDenormal(opcode, words)) {
       flush(words);
@@ -115,6 +123,8 @@ class Patcher {
       err(words, inexactness_.inverseRoot);
     } else if (known && isGlsl && words[4] == glslSqrt) {
       takeRoot(words);
+    } else if (known && isGlsl && words[4] == glslFma && inexactness_.fuses) {
+      fuse(words);
     } else {
       out_.insert(out_.end(), words.begin(), words.end());
     }
@@ -138,6 +148,8 @@ class Patcher {
   void declare() {
     declared_ = true;
     if (integer_ == 0) declareType(opTypeInt, {integer_ = bound_++, 32, 0});
+    if (inexactness_.fuses && float_ != 0)
+      declareType(opTypeFloat, {types_[float_].wide = bound_++, 64});
     for (auto& [id, type] : types_) {
       std::uint32_t& vector = integerVectors_[type.components];
       if (type.components == 1) vector = integer_;
@@ -146,6 +158,8 @@ class Patcher {
         declareType(opTypeVector, {vector, integer_, type.components});
       }
       type.integer = vector;
+      if (inexactness_.fuses && type.components > 1)
+        declareType(opTypeVector, {type.wide = bound_++, types_[float_].wide, type.components});
       for (const std::uint32_t value :
            {0x7f800000u, 0x7f000000u, 0x80000000u, 0x00800000u, 23u, 0u, multiplier}) {
         type.integers[value] = constant(integer_, type.integer, type.components, value);
@@ -221,6 +235,17 @@ class Patcher {
     emit(opFAdd, id, {exact, signedStep}, result);
   }
 
+  /// The product of two floats is exact in double precision, and so the sum is rounded once; but
+  /// for the rare case in which rounding to double and then to float is not the same.
+  void fuse(Words words) {
+    const std::uint32_t wide = types_[words[1]].wide;
+    const auto widened = [&](std::uint32_t id) { return emit(opFConvert, wide, {id}); };
+    const std::uint32_t a = widened(words[5]), b = widened(words[6]), c = widened(words[7]);
+    const std::uint32_t product = emit(opFMul, wide, {a, b});
+    emit(opFConvert, words[1], {emit(opFAdd, wide, {product, c})}, words[2]);
+    ++patched_;
+  }
+
   /// 1 / inversesqrt(x).
   void takeRoot(Words words) {
     if (inexactness_.division == Side::none && inexactness_.inverseRoot == Side::none) {
@@ -244,17 +269,19 @@ class Patcher {
   std::uint32_t bound_, glsl_ = 0, float_ = 0, integer_ = 0;
   std::map<std::uint32_t, Type> types_;
   std::map<std::uint32_t, std::uint32_t> integerVectors_;
+  std::set<std::uint32_t> fmas_;                      ///< ids of their results
   std::map<std::uint32_t, std::uint32_t> unflushed_;  ///< ids of results before they are flushed
   std::vector<std::uint32_t> out_;
   std::size_t patched_ = 0;
   bool declared_ = false;
 };
 
-/// GLSL.std.450: rounding, absolute values, signs, minima, maxima, clamps, bits; `Sqrt` and
-/// `InverseSqrt`, which are dealt with.
+/// GLSL.std.450: rounding, absolute values, signs, minima, maxima, clamps, bits; `Sqrt`,
+/// `InverseSqrt` and `Fma`, which are dealt with.
 bool isCertainGlsl(std::uint32_t instruction) {
-  static const std::set<std::uint32_t> certain{1,  2,  3,  4,  5,  6,  7,  8,  9,  31, 32, 37, 38,
-                                               39, 40, 41, 42, 43, 44, 45, 73, 74, 75, 79, 80, 81};
+  static const std::set<std::uint32_t> certain{1,  2,  3,  4,  5,  6,  7,  8,  9,
+                                               31, 32, 37, 38, 39, 40, 41, 42, 43,
+                                               44, 45, 50, 73, 74, 75, 79, 80, 81};
   return certain.contains(instruction);
 }
 

@@ -21,6 +21,9 @@ struct Inexactness {
   Side inverseRoot = Side::none;
   /// Denormals become 0 when they are loaded or computed. Not together with the others.
   bool flushesDenormals = false;
+  /// `fma` rounds once: it is computed in double precision. lavapipe rounds twice. Needs
+  /// shaderFloat64; not together with `flushesDenormals`.
+  bool fuses = false;
 };
 
 /// A module with that arithmetic. `patched`, if not null, is increased by the operations changed.

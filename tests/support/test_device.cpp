@@ -94,6 +94,7 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
 samples::DeviceOptions testDeviceOptions() {
   samples::DeviceOptions options;
   options.validation = true;
+  options.float64 = true;  // for kernels whose `fma` rounds once
   const char* wanted = std::getenv("DERMIS_TEST_DEVICE");
   if (wanted != nullptr) options.device = wanted;
   return options;

@@ -56,8 +56,8 @@ struct ShaderSource {
 ///
 /// `#include` needs no `#extension` line. A file that is included twice needs an include guard,
 /// since glslang ignores `#pragma once`. A file that includes itself, directly or through others,
-/// is an error. The optimization keeps `precise` (NoContraction), and all specialization constants
-/// and bindings, even if they are not used.
+/// is an error. Every `fma` becomes one operation (NoContraction). The optimization keeps
+/// `precise`, and all specialization constants and bindings, even if they are not used.
 ///
 /// Not thread-safe: use one object per thread. All objects share the tables of glslang. The first
 /// `compile` that finds no cache entry creates them, and the destructor of the last object frees

@@ -14,13 +14,14 @@
 #include "shader_compiler/hash.h"
 #include "shader_compiler/include_resolver.h"
 #include "shader_compiler/include_scan.h"
+#include "shader_compiler/no_contraction.h"
 #include "shader_compiler/optimizer.h"
 
 namespace dermis {
 namespace {
 
 // To be raised when this library itself makes other SPIR-V from the same text.
-constexpr std::uint64_t pipelineVersion = 1;
+constexpr std::uint64_t pipelineVersion = 2;
 
 Error invalidArgument(std::string message) {
   return Error{ErrorCode::invalidArgument, std::move(message)};
@@ -167,8 +168,8 @@ Result<std::vector<std::uint32_t>> ShaderCompiler::compileUnguarded(const Shader
   lastIncludes_ = resolver.filesRead();
   if (!translated) return translated.error();
   Result<std::vector<std::uint32_t>> words = optimizeAndValidate(
-      translated->words, {options_.optimize, options_.debugInfo, options_.scalarBlockLayout},
-      source.name);
+      decorateFma(translated->words),
+      {options_.optimize, options_.debugInfo, options_.scalarBlockLayout}, source.name);
   if (words && cache) {
     const std::string problem = cache->store(*translated, *words);
     if (!problem.empty()) {

@@ -210,6 +210,46 @@ Result<std::vector<ContractableInstruction>> findContractable(Words words) {
   return scanner.takeFound();
 }
 
+std::vector<std::uint32_t> decorateFma(Words words) {
+  constexpr std::uint32_t fma = 50;
+  std::set<std::uint32_t> sets, decorated;
+  std::vector<std::uint32_t> added;
+  std::size_t place = moduleHeaderLength;  // behind the last name and decoration
+  for (std::size_t at = moduleHeaderLength; at < words.size();) {
+    const std::size_t length = words[at] >> spv::WordCountShift;
+    if (length == 0 || length > words.size() - at) return {words.begin(), words.end()};
+    const std::uint32_t opcode = words[at] & spv::OpCodeMask;
+    const Words operands = words.subspan(at + 1, length - 1);
+    at += length;
+    switch (opcode) {
+      case spv::OpExtInstImport:
+        if (literalString(operands.subspan(1)) == glslInstructionSet) sets.insert(operands[0]);
+        break;
+      case spv::OpDecorate:
+        if (operands[1] == spv::DecorationNoContraction) decorated.insert(operands[0]);
+        [[fallthrough]];
+      case spv::OpName:
+      case spv::OpMemberName:
+      case spv::OpModuleProcessed:
+      case spv::OpMemberDecorate:
+      case spv::OpExecutionMode:
+        place = at;
+        break;
+      case spv::OpExtInst:
+        if (sets.contains(operands[2]) && operands[3] == fma && !decorated.contains(operands[1])) {
+          added.insert(added.end(), {3u << spv::WordCountShift | spv::OpDecorate, operands[1],
+                                     std::uint32_t{spv::DecorationNoContraction}});
+        }
+        break;
+      default:
+        break;
+    }
+  }
+  std::vector<std::uint32_t> result(words.begin(), words.end());
+  result.insert(result.begin() + static_cast<std::ptrdiff_t>(place), added.begin(), added.end());
+  return result;
+}
+
 std::string describe(const ContractableInstruction& instruction, const std::string& name) {
   std::string text = instruction.file.empty() ? name : instruction.file;
   if (instruction.line != 0) text.append(":").append(std::to_string(instruction.line));

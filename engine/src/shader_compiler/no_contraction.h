@@ -33,6 +33,12 @@ struct ContractableInstruction {
 DERMIS_SHADER_COMPILER_API Result<std::vector<ContractableInstruction>> findContractable(
     std::span<const std::uint32_t> words);
 
+/// Decorates every Fma of GLSL.std.450 NoContraction, which makes it one operation with the same
+/// result in every pipeline of a device. glslang does not, not even for `precise`. For words that
+/// are not a SPIR-V module it returns them.
+DERMIS_SHADER_COMPILER_API std::vector<std::uint32_t> decorateFma(
+    std::span<const std::uint32_t> words);
+
 /// "FILE:LINE: OpFMul in 'blend(vf4;' is not decorated NoContraction", with what is known of it;
 /// `name` is the source's.
 DERMIS_SHADER_COMPILER_API std::string describe(const ContractableInstruction& instruction,
