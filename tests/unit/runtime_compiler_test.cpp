@@ -75,6 +75,35 @@ TEST(RuntimeCompilerTest, UnchangedSourcesGiveTheModulesOfTheLibrary) {
   EXPECT_EQ(compiler.compiledModules(), recipes.size());
 }
 
+// Line information of GLSL, not the debug information that glslang makes of scopes: with that,
+// glslang 12 crashes in every kernel.
+TEST(RuntimeCompilerTest, EveryKernelCompilesWithDebugInformation) {
+  for (const kernels::Recipe& recipe : oneForEach()) {
+    SCOPED_TRACE(recipe.name);
+    ShaderCompilerOptions options;
+    options.debugInfo = true;
+    options.scalarBlockLayout = recipe.scalarBlockLayout;
+    const fs::path path = fs::path(kernelSources) / recipe.source;
+    std::ifstream file(path);
+    std::ostringstream text;
+    text << file.rdbuf();
+    ShaderSource source{path.string(), text.str(), ShaderStage::compute, {}};
+    std::istringstream macros(recipe.macros);
+    for (std::string macro; macros >> macro;) source.defines.emplace_back(macro, "");
+    EXPECT_TRUE(ShaderCompiler(options).compile(source).ok());
+    const std::size_t main = source.text.find("void main() {\n");
+    ASSERT_NE(main, std::string::npos);
+    source.text.insert(main + 14, "  if (gl_LocalInvocationID.x > 2u) { nothing(); }\n");
+    const Result<Words> broken = ShaderCompiler(options).compile(source);
+    ASSERT_FALSE(broken.ok());
+    const auto line =
+        2 + std::ranges::count(source.text.begin(),
+                               source.text.begin() + static_cast<std::ptrdiff_t>(main), '\n');
+    EXPECT_NE(broken.error().message.find(':' + std::to_string(line) + ':'), std::string::npos)
+        << broken.error().message;
+  }
+}
+
 TEST(RuntimeCompilerTest, ModulesAreKeptOnDiskAndDamageIsMended) {
   const ShaderFolder folder("cache");
   const fs::path cache = folder.path() / "cache";

@@ -73,14 +73,13 @@ struct ShaderInput {
   std::array<const char*, 1> names;
 };
 
-void configure(glslang::TShader& shader, const ShaderInput& input, bool debugInfo) {
+void configure(glslang::TShader& shader, const ShaderInput& input) {
   shader.setStringsWithLengthsAndNames(input.texts.data(), input.lengths.data(), input.names.data(),
                                        1);
   shader.setPreamble(input.preamble.c_str());
   shader.setEnvInput(glslang::EShSourceGlsl, shader.getStage(), glslang::EShClientVulkan, 100);
   shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_1);
   shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_3);
-  shader.setDebugInfo(debugInfo);
 }
 
 std::vector<std::uint32_t> generate(const glslang::TIntermediate& intermediate, bool debugInfo,
@@ -108,7 +107,7 @@ Result<FrontEndOutput> translateToSpirv(const ShaderSource& source, bool debugIn
 
   Includer includer(resolver, source.name);
   glslang::TShader shader(language);
-  configure(shader, input, debugInfo);
+  configure(shader, input);
   if (!shader.parse(GetDefaultResources(), defaultVersion, false, messages, includer)) {
     return Error{ErrorCode::shaderError, firstError(shader.getInfoLog(), source.name)};
   }
