@@ -165,6 +165,9 @@ std::optional<std::vector<ByteModel>> byteModels() {
                                  {"float32x3", float32x3, none}}) {
       for (const auto& [way, limits] :
            {std::pair{"words", &words}, {"staged", &staged}, {"wide", &wide}}) {
+        // Vertices of 24 bytes are not staged.
+        if (limits == &staged && layout.positions == float32x3 && layout.normals == float32x3)
+          continue;
         std::optional<ByteModel> model = modelOf(layout, method, way, *limits);
         if (!model) return std::nullopt;
         models.push_back(std::move(*model));

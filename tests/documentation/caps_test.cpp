@@ -49,7 +49,7 @@ std::set<std::string> allModules() {
       limits.stagedStores = kind / 4 % 2 != 0;
       PipelineNeeds needs;
       needs.method = method;
-      needs.layout.normals = VertexFormat::float32x3;
+      needs.layout.normals = VertexFormat::octahedral16x2;  // vertices of 16 bytes may be staged
       needs.layout.motion = kind / 8 % 2 != 0 ? true : false;
       needs.culledOnGpu = kind / 16 != 0;
       for (const PipelineId id : *pipelines(needs, limits, {}))

@@ -70,7 +70,7 @@ samples::OutputLayout layoutOf(VertexFormat positions, VertexFormat normals,
   return layout;
 }
 
-// Records of 8, 12, 16, 24 and 32 bytes; those of 24 begin within 16 bytes, too. Each once, and
+// Records of 8, 12, 16 and 32 bytes; those of 12 begin anywhere within 16 bytes. Each once, and
 // exhaustive_test has more of the same size.
 TEST_F(StagedTest, EveryRecordHasTheSameBits) {
   using enum VertexFormat;
@@ -83,12 +83,11 @@ TEST_F(StagedTest, EveryRecordHasTheSameBits) {
     const StagedCrowd crowd(method);
     int count = 0;
     for (const samples::OutputLayout& layout :
-         {layoutOf(float32x3, octahedral16x2, snorm16x4), layoutOf(float32x3, none, none),
-          layoutOf(float16x3, octahedral8x2, none),
+         {layoutOf(float32x3, none, none), layoutOf(float16x3, octahedral8x2, none),
           layoutOf(float16x4, octahedral16x2, octahedral16x2), layoutOf(float32x4, float32x4, none),
-          layoutOf(float32x3, float32x3, none), layoutOf(float32x3, octahedral16x2, none),
+          layoutOf(float32x3, octahedral16x2, none),
           layoutOf(float32x3, octahedral8x2, octahedral8x2), layoutOf(float16x4, none, none)}) {
-      if (!isExhaustive && ++count > 5) break;
+      if (!isExhaustive && ++count > 4) break;
       SCOPED_TRACE(std::string(methodName(method)) + ", " +
                    std::string(formatName(layout.positions)) + ", " +
                    std::string(formatName(layout.normals)) + ", " +
@@ -104,18 +103,20 @@ TEST_F(StagedTest, EveryRecordHasTheSameBits) {
 
 TEST_F(StagedTest, AnyTuningGivesTheSameBits) {
   const StagedCrowd crowd(Method::dualQuaternion);
+  const samples::OutputLayout layout =
+      layoutOf(VertexFormat::float32x3, VertexFormat::none, VertexFormat::none);
   for (const bool pushDescriptors : {true, false}) {
     useDevice(pushDescriptors);
     Result<vulkan::Context> staged = contextOf(device().description(), true);
     Result<vulkan::Context> plain = contextOf(device().description(), false);
     ASSERT_TRUE(staged.ok() && plain.ok());
-    const Result<samples::BatchResult> expected = run(*plain, crowd, {}, {64, 4});
+    const Result<samples::BatchResult> expected = run(*plain, crowd, layout, {64, 4});
     ASSERT_TRUE(expected.ok());
     for (const Tuning& tuning : {Tuning{8, 1}, Tuning{32, 5, 1000}, Tuning{128, 32}}) {
       // One where other descriptors are all that is new.
       if (!isExhaustive && !pushDescriptors && tuning.workgroupSize != 32) continue;
       SCOPED_TRACE(tuning.workgroupSize);
-      const Result<samples::BatchResult> result = run(*staged, crowd, {}, tuning);
+      const Result<samples::BatchResult> result = run(*staged, crowd, layout, tuning);
       ASSERT_TRUE(result.ok());
       expectSame(*result, *expected);
     }
@@ -133,7 +134,7 @@ TEST_F(StagedTest, OutputInSeveralRangesHasTheSameBits) {
       [](VkPhysicalDeviceLimits& limits) { limits.maxStorageBufferRange = 68 << 10; });
   Result<vulkan::Context> staged = contextOf(small.description(), true);
   ASSERT_TRUE(staged.ok());
-  for (const VertexFormat normals : {VertexFormat::float32x3, VertexFormat::none}) {
+  for (const VertexFormat normals : {VertexFormat::octahedral16x2, VertexFormat::none}) {
     const samples::OutputLayout layout =
         layoutOf(VertexFormat::float32x3, normals, VertexFormat::none);
     const Result<samples::BatchResult> expected = run(*plain, crowd, layout, {64, 4});

@@ -41,6 +41,7 @@ const DeviceProfile& profile() {
 
 void change(VkPhysicalDeviceProperties& properties) {
   properties.deviceType = profile().type;
+  properties.vendorID = profile().vendor;
   lowerLimits(profile(), properties.limits);
 }
 

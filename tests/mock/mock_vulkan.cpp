@@ -181,6 +181,7 @@ void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
   properties->apiVersion = VK_API_VERSION_1_1;
   properties->limits = mock->limits;
   properties->deviceType = mock->deviceType;
+  properties->vendorID = mock->vendor;
 }
 
 void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline pipeline) {

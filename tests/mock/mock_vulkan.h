@@ -70,6 +70,7 @@ struct MockVulkan {
   VkResult failure = VK_ERROR_OUT_OF_DEVICE_MEMORY;
   VkPhysicalDeviceLimits limits{};
   VkPhysicalDeviceType deviceType = VK_PHYSICAL_DEVICE_TYPE_OTHER;
+  std::uint32_t vendor = 0;
   std::vector<const char*> extensions;
   const VkAllocationCallbacks* allocator = nullptr;
 

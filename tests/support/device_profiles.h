@@ -18,6 +18,7 @@ namespace dermis::test {
 struct DeviceProfile {
   std::string_view name;
   VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
+  std::uint32_t vendor = 0;
   std::uint32_t storageBuffers = 4;       ///< of a stage
   std::uint32_t storageRange = 1u << 27;  ///< bytes
   std::uint32_t storageAlignment = 256;   ///< of offsets
@@ -54,6 +55,7 @@ inline constexpr std::array<DeviceProfile, 6> deviceProfiles{
       .sharedMemory = 32 << 10},
      {.name = "nvidia",
       .type = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU,
+      .vendor = 0x10de,
       .storageBuffers = 1u << 20,
       .storageRange = unlimited,
       .storageAlignment = 16,
@@ -65,6 +67,7 @@ inline constexpr std::array<DeviceProfile, 6> deviceProfiles{
       .sharedMemory = 48 << 10},
      {.name = "amd",
       .type = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU,
+      .vendor = 0x1002,
       .storageBuffers = unlimited,
       .storageRange = unlimited,
       .storageAlignment = 4,
@@ -76,6 +79,7 @@ inline constexpr std::array<DeviceProfile, 6> deviceProfiles{
       .sharedMemory = 64 << 10},
      {.name = "intel",
       .type = VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU,
+      .vendor = 0x8086,
       .storageBuffers = 64,
       .storageRange = 1u << 30,
       .storageAlignment = 4,

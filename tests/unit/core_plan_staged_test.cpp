@@ -18,11 +18,13 @@ DeviceLimits stagingLimits() {
   return limits;
 }
 
-/// The skin kernel of one job: positions and normals, float32x3, but for what `change` changes.
+/// The skin kernel of one job: positions and normals, float32x4, but for what `change` changes.
 template <typename Change>
 Variant variantOf(Change change) {
   OwnedBatch batch(meshOf(100, 4, 4, MeshParts{true, true, 0}), 4);
-  batch.addJob(0, 0, Method::dualQuaternion, true);
+  Job& job = batch.addJob(0, 0, Method::dualQuaternion, true);
+  job.places[Stream::positions] = {0, 32, VertexFormat::float32x4};
+  job.places[Stream::normals] = {16, 32, VertexFormat::float32x4};
   batch.outputSize = 1 << 20;
   DeviceLimits limits = stagingLimits();
   change(batch.jobs[0], limits);
@@ -35,14 +37,14 @@ Variant variantOf(Change change) {
 TEST(PlanStaged, EverydayVerticesWithoutGapsAreStaged) {
   const Variant usual = variantOf([](Job&, DeviceLimits&) {});
   EXPECT_TRUE(usual.staged);
-  EXPECT_EQ(usual.recordBytes, 24);
+  EXPECT_EQ(usual.recordBytes, 32);
   EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) { job.method = Method::linear; }).staged);
   EXPECT_TRUE(variantOf([](Job& job, DeviceLimits&) {
                 job.places[Stream::positions].offset += 8;
                 job.places[Stream::normals].offset += 8;
               }).staged);
   const Variant alone = variantOf([](Job& job, DeviceLimits&) {
-    job.places[Stream::positions].stride = 12;
+    job.places[Stream::positions] = {0, 12, VertexFormat::float32x3};
     job.places[Stream::normals] = {};
   });
   EXPECT_TRUE(alone.staged && alone.recordBytes == 12);
@@ -65,18 +67,22 @@ TEST(PlanStaged, OthersAreNot) {
   EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.method = Method::logMatrix; }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) { job.bounds = true; }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {
-    job.places[Stream::previousPositions] = {1 << 19, 12, VertexFormat::float32x3};
+    job.places[Stream::previousPositions] = {1 << 19, 16, VertexFormat::float32x4};
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // a gap
-    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 28;
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 36;
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // planar
-    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 12;
+    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 16;
     job.places[Stream::normals].offset = 1 << 19;
   }));
   EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // 20 bytes
-    job.places[Stream::positions].stride = job.places[Stream::normals].stride = 20;
-    job.places[Stream::normals].format = VertexFormat::float16x4;
+    job.places[Stream::positions] = {0, 20, VertexFormat::float32x3};
+    job.places[Stream::normals] = {12, 20, VertexFormat::float16x4};
+  }));
+  EXPECT_FALSE(isStaged([](Job& job, Limits&) {  // 24 bytes
+    job.places[Stream::positions] = {0, 24, VertexFormat::float32x3};
+    job.places[Stream::normals] = {12, 24, VertexFormat::float32x3};
   }));
 }
 
@@ -84,7 +90,9 @@ TEST(PlanStaged, OthersAreNot) {
 TEST(PlanStaged, NeedNoFurtherPipelines) {
   DeviceLimits limits = stagingLimits();
   const auto count = [&limits] {
-    return everyVariant(PipelineNeeds{.layout = {.normals = VertexFormat::float32x3}}, limits, {})
+    return everyVariant(PipelineNeeds{.layout = {.positions = VertexFormat::float32x4,
+                                                 .normals = VertexFormat::float32x4}},
+                        limits, {})
         ->size();
   };
   const std::size_t staged = count();
@@ -92,12 +100,12 @@ TEST(PlanStaged, NeedNoFurtherPipelines) {
   EXPECT_EQ(count(), staged);
 
   Job job;
-  job.places[Stream::positions] = {0, 24, VertexFormat::float32x3};
-  job.places[Stream::normals] = {12, 24, VertexFormat::float32x3};
+  job.places[Stream::positions] = {0, 32, VertexFormat::float32x4};
+  job.places[Stream::normals] = {16, 32, VertexFormat::float32x4};
   const std::vector<Variant> all = *everyVariant(job, stagingLimits(), {});
   for (std::uint64_t moved = 0; moved < 96; moved += 4) {
     job.places[Stream::positions].offset = moved;
-    job.places[Stream::normals].offset = moved + 12;
+    job.places[Stream::normals].offset = moved + 16;
     EXPECT_EQ(*everyVariant(job, stagingLimits(), {}), all) << moved;
   }
 }

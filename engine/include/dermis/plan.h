@@ -50,8 +50,8 @@ struct DeviceLimits {
   /// - `texelBuffers` is false;
   /// - the method is `linear` or `dualQuaternion`;
   /// - there are no previous positions or results;
-  /// - positions, normals and tangents are adjacent, without gaps, and take 8, 12, 16, 24 or 32
-  ///   bytes together.
+  /// - positions, normals and tangents are adjacent, without gaps, and take 8, 12, 16 or 32 bytes
+  ///   together.
   bool stagedStores = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;

@@ -1,9 +1,15 @@
 #include "vulkan/defaults.h"
 
 namespace dermis::vulkan {
+namespace {
+
+// Of VkPhysicalDeviceProperties::vendorID: numbers of the PCI SIG.
+constexpr std::uint32_t amd = 0x1002, intel = 0x8086;
+
+}  // namespace
 
 // Comments tell which values were measured and which are guesses; docs/gpus.md has the reasons.
-DeviceDefaults defaultsOf(VkPhysicalDeviceType type) {
+DeviceDefaults defaultsOf(VkPhysicalDeviceType type, std::uint32_t vendor) {
   DeviceDefaults defaults;
   Tuning& tuning = defaults.tuning;
   tuning.workgroupSize = 64;
@@ -13,8 +19,9 @@ DeviceDefaults defaultsOf(VkPhysicalDeviceType type) {
       tuning.instancesPerInvocation = 24;
       tuning.verticesPerInvocation = 8;
       break;
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:  // a guess
-      defaults.stagedStores = true;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:  // a guess, but for the stores
+      // The compilers of AMD and Intel merge the stores of words.
+      defaults.stagedStores = vendor != amd && vendor != intel;
       tuning.instancesPerInvocation = 4;
       tuning.minWorkgroups = 2048;
       break;

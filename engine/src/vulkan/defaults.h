@@ -14,6 +14,6 @@ struct DeviceDefaults {
   Tuning tuning;
 };
 
-DeviceDefaults defaultsOf(VkPhysicalDeviceType type);
+DeviceDefaults defaultsOf(VkPhysicalDeviceType type, std::uint32_t vendor);
 
 }  // namespace dermis::vulkan

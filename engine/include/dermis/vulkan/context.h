@@ -246,7 +246,7 @@ struct DeviceDescription {
   std::optional<bool> texelBuffers;
   /// Whether kernels may store interleaved vertices through workgroup memory
   /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete
-  /// GPUs (a guess), false for others.
+  /// GPUs (a guess) but those of AMD and Intel, false for others.
   std::optional<bool> stagedStores;
   /// Optional. Supplies the kernels instead of the library. Its `user` must outlive the Context.
   KernelSource kernelSource;
