@@ -17,7 +17,7 @@
 #   mutants      over two hundred mistakes planted in the engine, one at a time; a test must catch each (tests/mutants)
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
-#   compilers    what the compilers of AMD's GPUs make of the kernels, without a GPU: more instructions than before, spills
+#   compilers    what the compilers of AMD's GPUs make of the kernels, without a GPU: more instructions than before, spills; HLSL, MSL
 #   gpu          the device tests with the limits of other kinds of devices, and what measures a GPU, on lavapipe
 #   exhaustive   every combination of methods and formats, and every real model, on the device
 #   packages     ways to use Dermis that compile it again: as a subproject, from its source package, with another compiler
@@ -227,6 +227,12 @@ part_compilers() {
   table=build/ci/tests/bench/dermis_compiler_table
   build ci dermis_compiler_table
   tests/bench/compilers.py "$table"
+  for module in palette clear visibility skin skin_one_output skin_staged skin_extras skin_bulge skin_bulge_one_output skin_bulge_extras; do
+    for language in "hlsl --shader-model 60" "msl --msl-version 20300"; do
+      # shellcheck disable=SC2086 # an option and its argument
+      spirv-cross --$language "build/ci/shaders/dermis_kernels/$module.spv" >/dev/null
+    done
+  done
   settings=$(./tests/nightly/unpack_mesa.sh build/nightly/mesa)
   # shellcheck disable=SC2086 # NAME=VALUE words
   env $settings VK_DRIVER_FILES="$PWD/build/nightly/mesa/radeon.json" tests/bench/compilers.py "$table" --goals navi21 navi31
