@@ -67,7 +67,11 @@ const uint LOADED_INFLUENCES = INFLUENCES != 0u ? INFLUENCES : 4u;
 // Whether a vertex with `count` influences has this one. A constant if FULL.
 bool hasSlot(uint count, uint slot) { return FULL || slot < count; }
 
-// The influences of one vertex: the unit at which they begin, their number, and the loaded ones.
+// The units of a joint in the palette that METHOD reads. Joints are multiplied by it when they are loaded: once for all instances.
+const uint JOINT_UNITS = METHOD == METHOD_LINEAR ? UNITS_OF_MATRIX
+                         : METHOD == METHOD_LOG_MATRIX ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
+
+// The influences of one vertex: the unit at which they begin, their number, and the loaded ones. Joints are in units of the palette.
 struct Influences {
   uint unit;
   uint count;
@@ -94,12 +98,14 @@ Influences influencesOf(Sections sections, uint vertex, uint first) {
     influences.weights.zw = uintBitsToFloat(two.xz);
     influences.joints.zw = two.yw;
   }
+  influences.joints *= JOINT_UNITS;
   return influences;
 }
 
 InfluenceRecord loadInfluence(Influences influences, uint slot) {
   uvec4 two = meshUnit(influences.unit + slot / 2u);
-  return slot % 2u == 0u ? InfluenceRecord(uintBitsToFloat(two.x), two.y) : InfluenceRecord(uintBitsToFloat(two.z), two.w);
+  return slot % 2u == 0u ? InfluenceRecord(uintBitsToFloat(two.x), two.y * JOINT_UNITS)
+                         : InfluenceRecord(uintBitsToFloat(two.z), two.w * JOINT_UNITS);
 }
 
 struct InfluencePair {
@@ -110,7 +116,8 @@ struct InfluencePair {
 // The influences `slot`, which is even, and `slot` + 1: they are in one unit.
 InfluencePair loadInfluences(Influences influences, uint slot) {
   uvec4 two = meshUnit(influences.unit + slot / 2u);
-  return InfluencePair(InfluenceRecord(uintBitsToFloat(two.x), two.y), InfluenceRecord(uintBitsToFloat(two.z), two.w));
+  return InfluencePair(InfluenceRecord(uintBitsToFloat(two.x), two.y * JOINT_UNITS),
+                       InfluenceRecord(uintBitsToFloat(two.z), two.w * JOINT_UNITS));
 }
 
 // Whether a vertex has more than the loaded influences. The constant false if INFLUENCES is not 0.

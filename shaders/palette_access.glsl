@@ -4,6 +4,7 @@
 #define DERMIS_PALETTE_ACCESS_GLSL
 
 #include "abi.h"
+#include "mesh_access.glsl"
 #include "scale_shear.glsl"
 
 #ifdef TEXELS
@@ -31,21 +32,22 @@ StatusRecord loadStatus(uint palette) {
 // The constant false if no palette may scale, so that compilers remove all code for scale. Matrices have no status.
 bool paletteScales(uint palette) { return SCALES && METHOD != METHOD_LINEAR && loadStatus(palette).twoPhase != 0u; }
 
-vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint * 2u); }
-vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint * 2u); }
+// `joint` is in units, as in `Influences`.
+vec4 paletteRotation(uint palette, uint joint) { return paletteUnit(palette + 1u + joint); }
+vec4 paletteDual(uint palette, uint joint) { return paletteUnit(palette + 2u + joint); }
 
 ScaleShear paletteScaleShear(Pose pose, uint joint) {
-  const uint unitsOfJoint = METHOD == METHOD_LOG_MATRIX ? UNITS_OF_LOGARITHM : UNITS_OF_DUAL_QUATERNION;
-  uint unit = pose.palette + 1u + pose.joints * unitsOfJoint + joint * 2u;
+  uint part = JOINT_UNITS == UNITS_OF_SCALE_SHEAR ? joint : joint / JOINT_UNITS * UNITS_OF_SCALE_SHEAR;
+  uint unit = pose.palette + 1u + pose.joints * JOINT_UNITS + part;
   vec4 first = paletteUnit(unit);
   vec4 second = paletteUnit(unit + 1u);
   return ScaleShear(first.xyz, vec3(first.w, second.xy));
 }
 
 vec4 paletteLogarithmRow(uint palette, uint joint, uint row) {
-  return paletteUnit(palette + 1u + joint * UNITS_OF_LOGARITHM + row);
+  return paletteUnit(palette + 1u + joint + row);
 }
 
-vec4 paletteRow(uint palette, uint joint, uint row) { return paletteUnit(palette + joint * 3u + row); }
+vec4 paletteRow(uint palette, uint joint, uint row) { return paletteUnit(palette + joint + row); }
 
 #endif

@@ -17,7 +17,11 @@ struct Blend {
   vec4 dual;
 };
 
-float signedWeight(vec4 pivot, vec4 rotation, float weight) { return dot4(pivot, rotation) < 0.0 ? -weight : weight; }
+// Weights are not negative.
+float signedWeight(vec4 pivot, vec4 rotation, float weight) {
+  uint side = floatBitsToUint(dot4(pivot, rotation)) & 0x80000000u;
+  return uintBitsToFloat(floatBitsToUint(weight) | side);
+}
 
 Blend addJoint(Blend blend, vec4 pivot, float weight, Pose pose, uint joint) {
   vec4 rotation = paletteRotation(pose.palette, joint);
