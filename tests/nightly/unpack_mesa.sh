@@ -4,13 +4,13 @@
 #   tests/nightly/unpack_mesa.sh FOLDER
 #
 # Prints the two settings that make programs use lavapipe; radeon.json in FOLDER names the driver for AMD. Packages come from the mirror that apt on this machine uses; packages that are
-# already installed are used as they are. If FOLDER already contains a driver, only prints.
+# already installed are used as they are. If FOLDER already contains both, only prints.
 set -eu
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 icd=$folder/lavapipe.json
 
-if [ ! -s "$icd" ]; then
+if [ ! -s "$folder/radeon.json" ]; then
   . /etc/os-release
   suite=$VERSION_CODENAME-backports
   site=$(apt-get indextargets --format '$(SITE) $(CODENAME) $(COMPONENT)' 'Created-By: Packages' |
