@@ -348,8 +348,8 @@ class DERMIS_CORE_API Scene {
   Result<InstanceOutput> output(InstanceHandle instance) const;
   /// Fills `draws`, one for each of `instances`, for one indirect draw from the beginning of the
   /// output buffer. It needs the features drawIndirectFirstInstance and multiDrawIndirect. For
-  /// instances that are culled on the GPU, let the pass that culls set `instanceCount`: what it
-  /// finds visible is skinned in the same frame, while the count here lags behind. `indices` are
+  /// instances with `culledOnGpu`, let what writes the visibility buffer set `instanceCount`, too:
+  /// they are skinned in the same frame, while the count here lags behind. `indices` are
   /// the ranges of all meshes, by `MeshHandle::index`. Fails with `invalidArgument` if the sizes of
   /// both lists differ, for a mesh without a range, for a layout that is not interleaved and for
   /// one with another stride than the first; with `limitExceeded` for a first vertex beyond 2³¹
