@@ -124,7 +124,8 @@ Result<BatchResult> CpuRunner::skin() {
     const auto first = static_cast<std::size_t>(job.instances.data() - instances.data());
     for (std::size_t i = 0; i < own.size(); ++i) {
       const Job& from = layout_.jobs[first + i];
-      if (from.bounds || isSnormPosition(from.places[Stream::positions].format)) own[i].result = &found[i];
+      if (from.bounds || isSnormPosition(from.places[Stream::positions].format))
+        own[i].result = &found[i];
     }
     cpu::Job part = job;
     part.instances = own;
