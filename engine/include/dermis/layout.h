@@ -135,9 +135,8 @@ DERMIS_CORE_API std::array<double, 4> decodeTangent(VertexFormat format, const v
 ///   example, float16x3 and octahedral8x2 are a run of 8 bytes; float32x3 and octahedral8x2 twice
 ///   are one of 16. But float16x3 alone needs float16x4 instead.
 /// - All attributes must go to one buffer (`Batch::isOneOutput`) if positions, normals and
-/// tangents,
-///   as far as they are written, are one run of at least two attributes, or if the size of one of
-///   the three is not a multiple of 4 bytes.
+///   tangents, as far as they are written, are one run of at least two attributes, or if the size
+///   of one of the three is not a multiple of 4 bytes.
 /// - If positions and normals are float32x3, normals directly follow positions, and both have the
 ///   same stride, a multiple of 8: the offset of the positions must be a multiple of 8, and both
 ///   must be in one buffer, wherever tangents are.
