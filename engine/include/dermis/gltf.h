@@ -306,8 +306,7 @@ struct LoadOptions {
 /// - `invalidData` if the file is invalid. The message names the accessor, node or skin at fault.
 ///   An error in a part that nothing skinned or animated uses is a note instead;
 /// - `unsupportedFeature` if the file requires an unknown extension, or one that this build does
-/// not
-///   decode (`DERMIS_MESHOPTIMIZER`, `DERMIS_DRACO`), or is glTF 1.0;
+///   not decode (`DERMIS_MESHOPTIMIZER`, `DERMIS_DRACO`), or is glTF 1.0;
 /// - `limitExceeded` if more than 4 GiB of a file are needed, if a skin has more than
 ///   `maxPoseJoints` joints, if the model needs more memory than the files' sizes justify, or if
 ///   there is not enough memory.

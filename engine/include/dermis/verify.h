@@ -162,8 +162,7 @@ struct SkinnedView {
 /// `exemptions` states how many vertices have no bound. `Comparison::passed` is the verdict.
 ///
 /// - A vertex that is not finite in the reference fails, unless `VertexBounds::undefined` is set.
-/// So
-///   does one whose bound is not finite, unless `undefined` or `onlyFinite` is set.
+///   So does one whose bound is not finite, unless `undefined` or `onlyFinite` is set.
 /// - The handedness must be equal to that of the reference. If `VertexBounds::eitherHandedness` is
 ///   set, it must be 1 or -1.
 /// - The fourth component of a position must be 1, that of a normal 0.
