@@ -46,6 +46,9 @@ TEST(Plan, BuffersAreDescribed) {
     EXPECT_EQ(buffer.usage & usage, usage);
   }
   EXPECT_EQ(out.buffer(BufferRole::palettes).usage & storage, storage);
+  for (const BufferRole ofScene :
+       {BufferRole::gpuPoses, BufferRole::readBack, BufferRole::visibility, BufferRole::history})
+    EXPECT_EQ(out.buffer(ofScene).size, 0u);
 }
 
 TEST(Plan, StatusHasFourWords) {

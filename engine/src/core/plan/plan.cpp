@@ -118,8 +118,10 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::visibility:
       return {slots * std::uint64_t{4}, alignment, storage};
     case BufferRole::history:
-      return {historyRecords + slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment,
-              written};
+      if (slots != 0)
+        return {historyRecords + slots * std::uint64_t{sizeof(abi::HistoryRecord)}, alignment,
+                written};
+      break;
   }
   return {};
 }
