@@ -267,8 +267,11 @@ struct SceneBooks {
   std::uint64_t largestPoseBuffer(bool writtenByGpu) const {
     return limits_.maxStorageBufferRange / sizeof(JointMatrix) / slotsOf(writtenByGpu);
   }
+  const Capacity& jointCapacity(bool writtenByGpu) const {
+    return writtenByGpu ? description_.gpuJointCapacity : description_.jointCapacity;
+  }
   std::uint32_t slotsOf(bool writtenByGpu) const {
-    return !writtenByGpu ? description_.framesInFlight : 1;
+    return writtenByGpu ? 1 : description_.framesInFlight;
   }
   bool hasSlot() const;
   void makeSlot();

@@ -45,9 +45,8 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
-  const bool isCpu = !pose.writtenByGpu;
   const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
-                          isCpu ? BufferRole::poses : BufferRole::gpuPoses};
+                          pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
   work_.addPose(source, converted.unit, pose.jointCount, form, pose.mayScale);
 }
 

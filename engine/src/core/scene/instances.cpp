@@ -14,7 +14,7 @@ constexpr Subject theInstance{"the instance"};
 
 /// Of one vertex, without gaps.
 std::uint32_t attributeBytes(const VertexLayout& layout) {
-  const std::uint32_t positions = !layout.motion ? 1 : 2;
+  const std::uint32_t positions = layout.motion ? 2 : 1;
   return positions * formatSize(layout.positions) + formatSize(layout.normals) +
          formatSize(layout.tangents);
 }

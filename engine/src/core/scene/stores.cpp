@@ -60,9 +60,7 @@ Result<void> SceneBooks::createFirstBuffers() {
   }
   output_ = outputStore_.buffer.now.number;
   for (const bool writtenByGpu : {false, true}) {
-    const bool isCpu = !writtenByGpu;
-    const std::uint64_t joints =
-        (isCpu ? description_.jointCapacity : description_.gpuJointCapacity).initial;
+    const std::uint64_t joints = jointCapacity(writtenByGpu).initial;
     if (joints == 0) continue;
     if (Result<void> added = addPoseBuffer(writtenByGpu, joints); !added) return added;
   }
@@ -70,8 +68,7 @@ Result<void> SceneBooks::createFirstBuffers() {
 }
 
 Result<void> SceneBooks::addPoseBuffer(bool writtenByGpu, std::uint64_t joints) {
-  const bool isCpu = !writtenByGpu;
-  const BufferRole role = isCpu ? BufferRole::poses : BufferRole::gpuPoses;
+  const BufferRole role = writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses;
   joints *= slotsOf(writtenByGpu);
   PlanSizes added;
   added.isScene = true;
@@ -80,7 +77,8 @@ Result<void> SceneBooks::addPoseBuffer(bool writtenByGpu, std::uint64_t joints) 
   if (!made) return made.error();
   PoseStore& store =
       poseBuffers_.emplace_back(PoseStore{writtenByGpu, RangeAllocator(joints), *made, {}});
-  if (isCpu && made->mapped == nullptr) store.staged.resize(static_cast<std::size_t>(joints));
+  if (!writtenByGpu && made->mapped == nullptr)
+    store.staged.resize(static_cast<std::size_t>(joints));
   return {};
 }
 
@@ -189,8 +187,7 @@ Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, bool wr
       return range;
     total += store.joints.capacity() / slots;
   }
-  const bool isCpu = !writtenByGpu;
-  const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
+  const Capacity& capacity = jointCapacity(writtenByGpu);
   const std::uint64_t most = std::min(largestPoseBuffer(writtenByGpu),
                                       capacity.maximum - std::min(capacity.maximum, total));
   if (count > most) return std::optional<Range>();
@@ -202,19 +199,18 @@ Result<std::optional<Range>> SceneBooks::takeJoints(std::uint64_t count, bool wr
 }
 
 Error SceneBooks::noJoints(std::size_t poses, std::uint64_t count, bool writtenByGpu) const {
-  const bool isCpu = !writtenByGpu;
   std::uint64_t held = 0, used = 0;
   for (const PoseStore& store : poseBuffers_) {
     if (store.writtenByGpu != writtenByGpu) continue;
     held += store.joints.capacity() / slotsOf(writtenByGpu);
     used += store.joints.used() / slotsOf(writtenByGpu);
   }
-  const Capacity& capacity = isCpu ? description_.jointCapacity : description_.gpuJointCapacity;
+  const Capacity& capacity = jointCapacity(writtenByGpu);
   return {ErrorCode::limitExceeded,
           (poses == 1 ? std::string("a pose takes ") : std::to_string(poses) + " poses take ") +
               std::to_string(count) + " joints in one pose buffer, which holds at most " +
               std::to_string(largestPoseBuffer(writtenByGpu)) + "; all pose buffers that the " +
-              (isCpu ? "CPU" : "GPU") + " writes hold " + std::to_string(held) +
+              (writtenByGpu ? "GPU" : "CPU") + " writes hold " + std::to_string(held) +
               " joints, of which " + std::to_string(used) + " are in use; their maximum is " +
               std::to_string(capacity.maximum)};
 }
