@@ -217,7 +217,6 @@ std::vector<std::uint32_t> decorateFma(Words words) {
   std::size_t place = moduleHeaderLength;  // behind the last name and decoration
   for (std::size_t at = moduleHeaderLength; at < words.size();) {
     const std::size_t length = words[at] >> spv::WordCountShift;
-    if (length == 0 || length > words.size() - at) return {words.begin(), words.end()};
     const std::uint32_t opcode = words[at] & spv::OpCodeMask;
     const Words operands = words.subspan(at + 1, length - 1);
     at += length;

@@ -34,8 +34,8 @@ DERMIS_SHADER_COMPILER_API Result<std::vector<ContractableInstruction>> findCont
     std::span<const std::uint32_t> words);
 
 /// Decorates every Fma of GLSL.std.450 NoContraction, which makes it one operation with the same
-/// result in every pipeline of a device. glslang does not, not even for `precise`. For words that
-/// are not a SPIR-V module it returns them.
+/// result in every pipeline of a device. glslang does not, not even for `precise`. `words` are a
+/// valid module.
 DERMIS_SHADER_COMPILER_API std::vector<std::uint32_t> decorateFma(
     std::span<const std::uint32_t> words);
 

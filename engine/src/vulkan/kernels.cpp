@@ -34,7 +34,6 @@ static_assert(abi::FORMAT_SNORM8X4 == static_cast<std::uint32_t>(VertexFormat::s
 static_assert(abi::FORMAT_OCTAHEDRAL16X2 ==
               static_cast<std::uint32_t>(VertexFormat::octahedral16x2));
 static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexFormat::octahedral8x2));
-static_assert(static_cast<std::uint32_t>(false) == 0);  // a boolean of the kernel
 // Records are read four words at a time.
 static_assert(sizeof(abi::PaletteRecord) == abi::PALETTE_WORDS * 4);
 static_assert(sizeof(abi::GroupRecord) == abi::GROUP_WORDS * 4 && abi::GROUP_WORDS % 4 == 0);
