@@ -26,13 +26,13 @@ chips = ["polaris10", "vega10", "navi21", "gfx1100"]
 
 
 def compiled(program, chip, *arguments):
-    """The lines of PROGRAM for a chip: the kernel, and its statistics by name."""
+    """The lines of PROGRAM for a chip: the kernel, and its statistics by name, which are empty where something failed."""
     driver = os.environ.get("VK_DRIVER_FILES", debian)
     environment = dict(os.environ, RADV_FORCE_FAMILY=chip, VK_DRIVER_FILES=driver, VK_ICD_FILENAMES=driver,
                        MESA_SHADER_CACHE_DISABLE="true")
     done = subprocess.run([program, *arguments], env=environment, stdout=subprocess.PIPE, text=True)
     if done.returncode != 0:
-        print(f"compilers.py: {program} failed for {chip}")
+        yield f"exit status {done.returncode}", {}
     for line in done.stdout.splitlines():
         layout, stores, kernel, *values = line.split("\t")
         yield f"{layout}; {stores}; {kernel}", dict(value.split("=", 1) for value in values if "=" in value)
@@ -130,7 +130,7 @@ def goals(program):
                 f"skin float16x4, octahedral16x2 skin kernel for linear {f16}, {four}")]
     for chip in sys.argv[3:] or ["navi21"]:
         with tempfile.TemporaryDirectory() as folder:
-            waves = {kernel: values["Subgroups per SIMD"] for kernel, values in compiled(program, chip, folder)}
+            waves = {kernel: values.get("Subgroups per SIMD") for kernel, values in compiled(program, chip, folder)}
             print(f"{chip}: vector instructions in the loop over instances; with the rest for 4 instances; waves")
             for title, name in kernels:
                 path = Path(folder) / (re.sub("[ ,/]", "_", name) + ".s")
