@@ -17,7 +17,7 @@ struct ByteModel {
   double stored = 0;    ///< bytes of the 32-byte sectors that each store touches, over all stores
   double meshRead = 0;  ///< shared by the instances of an invocation
   double paletteRead = 0;
-  double operations = 0;  ///< multiplications and additions counted separately
+  double operations = 0;  ///< multiplications and additions; an `fma` counts once
 };
 
 /// Throughput of a GPU per second, in units of 10^12.

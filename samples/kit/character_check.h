@@ -58,7 +58,8 @@ class CharacterCheck {
     double worst = 0;            ///< the largest error ÷ its bound
   };
 
-  /// `character` must outlive it. Instances are skinned by `method`, with `true`.
+  /// `character` must outlive it. Instances are skinned by `method`, with previous
+  /// positions.
   CharacterCheck(const Character& character, Method method)
       : character_(&character), method_(method) {}
 

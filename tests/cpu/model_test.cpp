@@ -64,7 +64,7 @@ class CpuModelTest : public ::testing::TestWithParam<std::uint32_t>, public Mode
                     const InstanceDescription& description,
                     std::span<const MorphWeight> morphs) override {
     VertexLayout layout = description.layout;
-    const bool hasPrevious = std::exchange(layout.motion, false) != false;
+    const bool hasPrevious = std::exchange(layout.motion, false);
     cpu::Instance instance;
     instance.pose = pose;
     instance.morphs = morphs;

@@ -136,7 +136,7 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
     layouts.push_back(layoutOf(isPositionFormat(format) ? format : VertexFormat::float32x3,
                                isNormalFormat(format) ? format : VertexFormat::none,
                                isTangentFormat(format) ? format : VertexFormat::none, false,
-                               layouts.size() % 2 == 0 ? true : false));
+                               layouts.size() % 2 == 0));
   }
   for (std::size_t number = 0; number < layouts.size(); ++number) {
     const auto influences = static_cast<std::uint32_t>(number % 6 + 1);

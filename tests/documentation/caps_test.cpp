@@ -50,7 +50,7 @@ std::set<std::string> allModules() {
       PipelineNeeds needs;
       needs.method = method;
       needs.layout.normals = VertexFormat::octahedral16x2;  // vertices of 16 bytes may be staged
-      needs.layout.motion = kind / 8 % 2 != 0 ? true : false;
+      needs.layout.motion = kind / 8 % 2 != 0;
       needs.culledOnGpu = kind / 16 != 0;
       for (const PipelineId id : *pipelines(needs, limits, {}))
         modules.insert(vulkan::pipelineDescription(id)->module);

@@ -95,7 +95,7 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
   std::vector<PoseHandle> cpuPoses, gpuPoses;
   std::vector<InstanceHandle> instances;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const bool writtenByGpu = i % 3 == 0 ? true : false;
+    const bool writtenByGpu = i % 3 == 0;
     instance.pose = must(system->scene().addPose(8, {.writtenByGpu = writtenByGpu}));
     (writtenByGpu ? gpuPoses : cpuPoses).push_back(instance.pose);
     instance.method = i % 2 == 0 ? Method::dualQuaternion : Method::linear;

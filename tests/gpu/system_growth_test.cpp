@@ -129,7 +129,7 @@ TEST_F(SystemGrowthTest, DescriptorSetsInFlightAreNeverRewritten) {
   for (int frame = 0; frame < 12; ++frame) {
     engine.begin(2);
     instance.mesh = engine.addMesh(mesh);
-    instance.pose = engine.addPose(systemPose(1), {.writtenByGpu = frame % 2 == 0 ? false : true});
+    instance.pose = engine.addPose(systemPose(1), {.writtenByGpu = frame % 2 != 0});
     for (int i = 0; i <= frame * 2; ++i) instances.push_back(engine.addInstance(instance));
     engine.submit();
   }
@@ -228,7 +228,7 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
   for (std::uint32_t i = 0; i < 6; ++i) {
     if (i % 3 == 0) instance.mesh = engine.addMesh(mesh);
     instance.method = i % 2 == 0 ? Method::linear : Method::dualQuaternion;
-    instance.pose = engine.addPose(systemPose(i), {.writtenByGpu = i < 3 ? true : false});
+    instance.pose = engine.addPose(systemPose(i), {.writtenByGpu = i < 3});
     descriptions.push_back(instance);
     instances.push_back(engine.addInstance(instance));
   }

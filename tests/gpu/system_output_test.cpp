@@ -114,7 +114,7 @@ TEST_F(SystemOutputTest, ARangeOfTheEnginesBufferIsAllThatIsWritten) {
   for (std::uint32_t i = 0; i < 12; ++i) {
     instance.pose = engine.addPose(systemPose(i));
     instance.layout = motionLayout();
-    instance.layout.planar = i % 2 == 0 ? false : true;
+    instance.layout.planar = i % 2 != 0;
     descriptions.push_back(instance);
     instances.push_back(engine.addInstance(instance));
   }

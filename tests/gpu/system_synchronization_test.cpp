@@ -237,7 +237,7 @@ class EventfulFrames {
       if (frame != 3) instance.mesh = engine.addMesh(systemMesh(frame, 60));
       for (std::uint32_t i = 0; frame != 3 && i < 4; ++i) {
         const bool isOfGpu = events.gpuPoses && i % 2 == 0;
-        poses.push_back(engine.addPose(systemPose(i), {.writtenByGpu = isOfGpu ? true : false}));
+        poses.push_back(engine.addPose(systemPose(i), {.writtenByGpu = isOfGpu}));
         instance.pose = poses.back();
         instance.culledOnGpu = events.culls && i < 2;
         instance.method = i == 3 ? Method::linear : Method::dualQuaternion;

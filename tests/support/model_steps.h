@@ -155,7 +155,7 @@ class ModelSteps {
   void addPose() {
     if (model_->poses.size() >= 30) return;
     const std::uint32_t pose = below(poseCount);
-    const bool writtenByGpu = hasGpu && chance(40) ? true : false;
+    const bool writtenByGpu = hasGpu && chance(40);
     if (chance(30))
       tryToAdd([&] { return system().addPose(8, {.writtenByGpu = writtenByGpu}); },
                [&](PoseHandle added) { must(system().removePose(added)); });
