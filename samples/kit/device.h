@@ -45,9 +45,9 @@ struct DeviceOptions {
   bool rayTracing = false;      ///< enable acceleration structures, buffer device addresses and ray
                                 ///< queries if the device has them
   bool graphics = false;        ///< requires a graphics queue; enables `indirectDraws`
-  /// Enable queries that count invocations if the device has them.
-  bool float64 = false;  ///< whether to enable `DeviceInfo::float64`
-  bool pipelineStatistics = false;
+  bool float64 = false;         ///< enable `DeviceInfo::float64` if the device has it
+  bool pipelineStatistics =
+      false;                     ///< enable queries that count invocations if the device has them
   vulkan::KernelSource kernels;  ///< of the context; empty: the library's
   /// Instance extensions for the surface of a window. If there are any, VK_KHR_swapchain is
   /// required and enabled.

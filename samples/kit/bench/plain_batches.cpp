@@ -14,7 +14,6 @@ namespace {
 constexpr std::uint32_t workgroupSize = 64;  // of all kernels
 constexpr std::uint64_t outputStride = 24;
 constexpr std::uint64_t copiedTogether = 24;  // instances per invocation of plain_copy.comp
-constexpr std::uint32_t bindingCount = 3;
 /// A dispatch skins whole instances, in multiples of this. With 24 bytes per vertex, their output
 /// then begins at a multiple of 256 bytes, the largest alignment that a device may require.
 constexpr std::uint64_t instanceStep = 32;
@@ -51,13 +50,22 @@ Result<void> PlainBatches::make(const Crowd& crowd) {
   const std::uint64_t step =
       instancesTogether(maxRange_, std::uint64_t{crowd.vertexCount()} * outputStride);
   const std::uint64_t dispatches = (crowd.instanceCount() + step - 1) / step;
-  if (Result<void> made = makeLayouts(static_cast<std::uint32_t>(dispatches)); !made) return made;
-  if (Result<void> made = makePipeline(palettePipeline_, plain_kernels::plain_palette_spirv); !made)
-    return made;
+  // The sets of the three kernels, and that of the palettes.
+  const std::uint64_t sets = dispatches * plainKernelCount + 1;
+  Result<StorageKernels> kernels =
+      StorageKernels::create(device_, 3, 12, static_cast<std::uint32_t>(sets));
+  if (!kernels) return kernels.error();
+  kernels_ = std::move(*kernels);
+  Result<render::Owned<VkPipeline>> palettes =
+      kernels_.makePipeline(plain_kernels::plain_palette_spirv);
+  if (!palettes) return palettes.error();
+  palettePipeline_ = std::move(*palettes);
   const std::array spirv{plain_kernels::plain_skin_spirv, plain_kernels::plain_linear_spirv,
                          plain_kernels::plain_copy_spirv};
   for (std::size_t kernel = 0; kernel < plainKernelCount; ++kernel) {
-    if (Result<void> made = makePipeline(pipelines_[kernel], spirv[kernel]); !made) return made;
+    Result<render::Owned<VkPipeline>> pipeline = kernels_.makePipeline(spirv[kernel]);
+    if (!pipeline) return pipeline.error();
+    pipelines_[kernel] = std::move(*pipeline);
     if (Result<void> recorded = record(crowd, static_cast<PlainKernel>(kernel)); !recorded)
       return recorded;
     const Result<double> first = skin(static_cast<PlainKernel>(kernel));
@@ -92,111 +100,13 @@ Result<void> PlainBatches::makeBuffers(const Crowd& crowd) {
   return {};
 }
 
-Result<void> PlainBatches::makeLayouts(std::uint32_t dispatches) {
-  std::array<VkDescriptorSetLayoutBinding, bindingCount> bindings{};
-  for (std::uint32_t binding = 0; binding < bindingCount; ++binding) {
-    bindings[binding] = {binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT,
-                         nullptr};
-  }
-  VkDescriptorSetLayoutCreateInfo setInfo{};
-  setInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-  setInfo.bindingCount = bindingCount;
-  setInfo.pBindings = bindings.data();
-  Result<render::Owned<VkDescriptorSetLayout>> setLayout =
-      DERMIS_MAKE(device_, DescriptorSetLayout, setInfo);
-  if (!setLayout) return setLayout.error();
-  setLayout_ = std::move(*setLayout);
-  const VkDescriptorSetLayout set = setLayout_.get();
-  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, 12};
-  VkPipelineLayoutCreateInfo layoutInfo{};
-  layoutInfo.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
-  layoutInfo.setLayoutCount = 1;
-  layoutInfo.pSetLayouts = &set;
-  layoutInfo.pushConstantRangeCount = 1;
-  layoutInfo.pPushConstantRanges = &range;
-  Result<render::Owned<VkPipelineLayout>> layout = DERMIS_MAKE(device_, PipelineLayout, layoutInfo);
-  if (!layout) return layout.error();
-  layout_ = std::move(*layout);
-  // The sets of the three kernels, and that of the palettes.
-  const std::uint32_t sets = dispatches * std::uint32_t{plainKernelCount} + 1;
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets * bindingCount};
-  VkDescriptorPoolCreateInfo poolInfo{};
-  poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-  poolInfo.maxSets = sets;
-  poolInfo.poolSizeCount = 1;
-  poolInfo.pPoolSizes = &size;
-  Result<render::Owned<VkDescriptorPool>> pool = DERMIS_MAKE(device_, DescriptorPool, poolInfo);
-  if (!pool) return pool.error();
-  pool_ = std::move(*pool);
-  return {};
-}
-
-Result<void> PlainBatches::makePipeline(render::Owned<VkPipeline>& pipeline,
-                                        std::span<const std::uint32_t> spirv) {
-  VkShaderModuleCreateInfo moduleInfo{};
-  moduleInfo.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-  moduleInfo.codeSize = spirv.size_bytes();
-  moduleInfo.pCode = spirv.data();
-  const Result<render::Owned<VkShaderModule>> module =
-      DERMIS_MAKE(device_, ShaderModule, moduleInfo);
-  if (!module) return module.error();
-  VkComputePipelineCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module->get();
-  info.stage.pName = "main";
-  info.layout = layout_.get();
-  const VulkanFunctions& functions = device_.functions();
-  VkPipeline made = VK_NULL_HANDLE;
-  const VkResult result =
-      functions.CreateComputePipelines(device_.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &made);
-  pipeline = {device_.handle(), made, functions.DestroyPipeline};
-  return checkVulkan("vkCreateComputePipelines", result);
-}
-
-Result<void> PlainBatches::bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
-                                std::span<const vulkan::BufferRange> buffers) {
-  VkDescriptorSetAllocateInfo allocateInfo{};
-  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  const VkDescriptorSetLayout layout = setLayout_.get();
-  allocateInfo.descriptorPool = pool_.get();
-  allocateInfo.descriptorSetCount = 1;
-  allocateInfo.pSetLayouts = &layout;
-  VkDescriptorSet set = VK_NULL_HANDLE;
-  if (Result<void> good = checkVulkan(
-          "vkAllocateDescriptorSets",
-          device_.functions().AllocateDescriptorSets(device_.handle(), &allocateInfo, &set));
-      !good)
-    return good;
-  std::array<VkDescriptorBufferInfo, bindingCount> infos{};
-  std::array<VkWriteDescriptorSet, bindingCount> writes{};
-  for (std::uint32_t binding = 0; binding < buffers.size(); ++binding) {
-    const vulkan::BufferRange& range = buffers[binding];
-    infos[binding] = {range.buffer, range.offset, range.size};
-    writes[binding].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-    writes[binding].dstSet = set;
-    writes[binding].dstBinding = binding;
-    writes[binding].descriptorCount = 1;
-    writes[binding].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-    writes[binding].pBufferInfo = &infos[binding];
-  }
-  device_.functions().UpdateDescriptorSets(
-      device_.handle(), static_cast<std::uint32_t>(buffers.size()), writes.data(), 0, nullptr);
-  device_.functions().CmdBindPipeline(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-  device_.functions().CmdBindDescriptorSets(commandBuffer, VK_PIPELINE_BIND_POINT_COMPUTE,
-                                            layout_.get(), 0, 1, &set, 0, nullptr);
-  return {};
-}
-
 Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer) {
-  if (Result<void> bound = bind(commandBuffer, palettePipeline_.get(),
-                                std::array{matrices_.range(), palettes_.range()});
+  if (Result<void> bound = kernels_.bind(commandBuffer, palettePipeline_.get(),
+                                         std::array{matrices_.range(), palettes_.range()});
       !bound)
     return bound;
   const std::uint32_t jointTotal = crowd.instanceCount() * crowd.jointCount();
-  device_.functions().CmdPushConstants(commandBuffer, layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                                       4, &jointTotal);
+  kernels_.push(commandBuffer, {&jointTotal, 1});
   device_.functions().CmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
   recordBarrier(device_, commandBuffer,
                 vulkan::barrierBetween(Use::computeWrite, Use::computeRead));
@@ -213,8 +123,9 @@ Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel
     const std::uint64_t count = std::min(step, crowd.instanceCount() - first);
     const vulkan::BufferRange written{output_.range().buffer, first * instanceSize,
                                       count * instanceSize};
-    if (Result<void> bound = bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)].get(),
-                                  std::array{vertices_.range(), joints, written});
+    if (Result<void> bound =
+            kernels_.bind(commandBuffer, pipelines_[static_cast<std::size_t>(kernel)].get(),
+                          std::array{vertices_.range(), joints, written});
         !bound)
       return bound;
     const bool copies = kernel == PlainKernel::copy;
@@ -222,8 +133,7 @@ Result<void> PlainBatches::recordSkinning(const Crowd& crowd, PlainKernel kernel
         crowd.vertexCount(), copies ? static_cast<std::uint32_t>(count) : crowd.jointCount(),
         static_cast<std::uint32_t>(first)};
     const std::uint64_t rows = copies ? (count + copiedTogether - 1) / copiedTogether : count;
-    device_.functions().CmdPushConstants(commandBuffer, layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT,
-                                         0, sizeof(push), push.data());
+    kernels_.push(commandBuffer, push);
     device_.functions().CmdDispatch(commandBuffer, groupsOf(crowd.vertexCount()),
                                     static_cast<std::uint32_t>(rows), 1);
   }

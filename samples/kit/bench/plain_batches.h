@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kit/bench/crowd.h"
+#include "kit/bench/storage_kernels.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
 #include "kit/render/owned.h"
@@ -43,24 +44,17 @@ class PlainBatches {
       : device_(*open.device), maxRange_(open.context.limits().maxStorageBufferRange) {}
   Result<void> make(const Crowd& crowd);
   Result<void> makeBuffers(const Crowd& crowd);
-  Result<void> makeLayouts(std::uint32_t dispatches);
-  Result<void> makePipeline(render::Owned<VkPipeline>& pipeline,
-                            std::span<const std::uint32_t> spirv);
   Result<void> record(const Crowd& crowd, PlainKernel kernel);
   Result<void> recordPalettes(const Crowd& crowd, VkCommandBuffer commandBuffer);
   Result<void> recordSkinning(const Crowd& crowd, PlainKernel kernel,
                               VkCommandBuffer commandBuffer);
-  Result<void> bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
-                    std::span<const vulkan::BufferRange> buffers);
 
   Device& device_;
   std::uint64_t maxRange_;
   Timestamps timestamps_;
   MappedBuffer vertices_, matrices_;
   DeviceBuffer palettes_, output_;
-  render::Owned<VkDescriptorSetLayout> setLayout_;
-  render::Owned<VkPipelineLayout> layout_;
-  render::Owned<VkDescriptorPool> pool_;
+  StorageKernels kernels_;
   render::Owned<VkPipeline> palettePipeline_;
   std::array<render::Owned<VkPipeline>, plainKernelCount> pipelines_;
   std::array<VkCommandBuffer, plainKernelCount> commandBuffers_{};
