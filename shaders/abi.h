@@ -199,11 +199,14 @@ struct GroupRecord {
   uint normalStride;
   uint tangentStride;
   uint previousStride;
-  // If 1, each word of the instance records changes by a constant amount from one record to the
-  // next. With snorm16 positions, all boxes are then also equal.
-  uint evenlySpaced;
+  // Instances that an invocation skins; the last ones may skin fewer. Perhaps with EVENLY_SPACED.
+  uint instancesEach;
 };
 DERMIS_CONSTANT GROUP_WORDS = 12u;
+
+// In GroupRecord::instancesEach: each word of the instance records changes by a constant amount
+// from one record to the next. With snorm16 positions, all boxes are then also equal.
+DERMIS_CONSTANT EVENLY_SPACED = 0x80000000u;
 
 // An instance. Output offsets are those of the first vertex of the group, in bytes from the
 // beginning of the range that the dispatch writes.
@@ -281,7 +284,7 @@ DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
 struct CulledDispatchRecord {
   uint groups;  // word offset of the first group record
   uint groupCount;
-  uint instancesPerInvocation;
+  uint instancesPerInvocation;  // at most
   uint reserved;
 };
 DERMIS_CONSTANT CULLED_DISPATCH_WORDS = 4u;
@@ -333,9 +336,8 @@ struct SkinPush {
   uint groups;  // word offset of the group records
   uint groupCount;
   uint workgroupCount;
-  uint instances;               // word offset of the instance records
-  uint instancesPerInvocation;  // 1 to the value of CONSTANT_INSTANCES
-  uint verticesPerInvocation;   // used only with texel buffers
+  uint instances;              // word offset of the instance records
+  uint verticesPerInvocation;  // used only with texel buffers
 };
 struct VisibilityPush {
   uint pass;           // VISIBILITY_CHOOSES or VISIBILITY_COUNTS

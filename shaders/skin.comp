@@ -238,15 +238,8 @@ struct Share {
   uint count;
 };
 
-// The instances of a group are divided into shares. All but the last have the same size, so that workgroups take about the same
-// time, and the work is spread evenly over the threads.
 Share shareOf(GroupRecord group, uint number) {
-  uint size = INSTANCES;
-  if (INSTANCES > 1u) {
-    uint most = push.instancesPerInvocation;
-    uint shares = max((group.instanceCount + most - 1u) / most, 1u);
-    size = (group.instanceCount + shares - 1u) / shares;
-  }
+  uint size = group.instancesEach & ~EVENLY_SPACED;
   uint first = min(number * size, group.instanceCount);
   return Share(push.instances + (group.firstInstance + first) * INSTANCE_WORDS, min(size, group.instanceCount - first));
 }

@@ -56,7 +56,7 @@ CulledDispatchRecord loadCulledDispatch(uint word) {
 void storeGroup(uint word, GroupRecord r) {
   tableUnits[word / 4u] = uvec4(r.workgroupEnd, r.mesh, r.firstVertex, r.vertexEnd);
   tableUnits[word / 4u + 1u] = uvec4(r.vertexGroups, r.firstInstance, r.instanceCount, r.positionStride);
-  tableUnits[word / 4u + 2u] = uvec4(r.normalStride, r.tangentStride, r.previousStride, r.evenlySpaced);
+  tableUnits[word / 4u + 2u] = uvec4(r.normalStride, r.tangentStride, r.previousStride, r.instancesEach);
 }
 
 void storeInstance(uint word, InstanceRecord r) {

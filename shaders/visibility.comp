@@ -103,6 +103,7 @@ void countWorkgroups(uint word, uint arguments) {
     uint place = dispatch.groups + number * GROUP_WORDS;
     GroupRecord group = loadGroup(place);
     uint rounds = (group.instanceCount + dispatch.instancesPerInvocation - 1u) / dispatch.instancesPerInvocation;
+    group.instancesEach = rounds == 0u ? 0u : (group.instanceCount + rounds - 1u) / rounds;
     workgroups += group.vertexGroups * rounds;
     group.workgroupEnd = workgroups;
     storeGroup(place, group);

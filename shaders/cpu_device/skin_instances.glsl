@@ -54,7 +54,7 @@ void skinInstances(GroupRecord group, Share share, uint run, uint vertex) {
   uint count = share.count;
   uvec4 strides = uvec4(group.positionStride, group.normalStride, group.tangentStride, group.previousStride);
   uint left = 0xffffffffu >> (32u - count);  // one bit per instance
-  bool even = group.evenlySpaced != 0u;
+  bool even = (group.instancesEach & EVENLY_SPACED) != 0u;
   Instance by = stepBetween(loadInstance(records), loadInstance(records + min(1u, count - 1u) * INSTANCE_WORDS));
   uint scaling = 0u;
   if (APART) {

@@ -216,7 +216,6 @@ class Simulation {
     ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
     ASSERT_EQ(dispatch.variant.instancesPerInvocation, tuning_.instancesPerInvocation);
     ASSERT_EQ(push.verticesPerInvocation, verticesWanted(push));
-    ASSERT_EQ(push.instancesPerInvocation, instancesWanted(push));
     for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
       // The first group whose end lies behind the workgroup's number.
       std::uint32_t index = 0, begin = 0, end = 0;
@@ -293,17 +292,25 @@ class Simulation {
         }
       }
     }
-    ASSERT_EQ(groupAt(group).evenlySpaced, isEven ? 1u : 0u);
+    ASSERT_EQ((groupAt(group).instancesEach & abi::EVENLY_SPACED) != 0, isEven);
+  }
+
+  /// All invocations of a group skin about as many instances.
+  void checkShare(const PlannedDispatch& dispatch, std::uint32_t group) {
+    const std::uint32_t count = groupAt(group).instanceCount;
+    const std::uint64_t shares = divideUp(count, instancesWanted(dispatch.skinPush()));
+    ASSERT_EQ(groupAt(group).instancesEach & ~abi::EVENLY_SPACED, divideUp(count, shares));
   }
 
   void runWorkgroup(const PlannedDispatch& dispatch, std::uint32_t group, std::uint32_t local) {
     if (local == 0) {
       ASSERT_NO_FATAL_FAILURE(checkSpacing(dispatch, group));
+      ASSERT_NO_FATAL_FAILURE(checkShare(dispatch, group));
     }
     const std::uint32_t vertexGroups = groupAt(group).vertexGroups;
     const std::uint32_t firstVertex = groupAt(group).firstVertex;
     const std::uint32_t vertexEnd = groupAt(group).vertexEnd;
-    const std::uint32_t instancesEach = dispatch.skinPush().instancesPerInvocation;
+    const std::uint32_t instancesEach = groupAt(group).instancesEach & ~abi::EVENLY_SPACED;
     const std::uint32_t firstInstance = local / vertexGroups * instancesEach;
     const std::uint32_t instanceCount = groupAt(group).instanceCount;
     ASSERT_LT(firstInstance, instanceCount) << "an idle workgroup";

@@ -218,12 +218,13 @@ Result<void> Encoder::addDispatches() {
     std::size_t end = begin;
     while (end < order.size() && work_->shareDispatch(order[begin], order[end])) ++end;
     chooseVerticesPerInvocation(order.subspan(begin, end - begin));
-    const std::uint32_t instancesEach = instancesPerInvocation(order.subspan(begin, end - begin));
+    const std::uint32_t mostInstances = instancesPerInvocation(order.subspan(begin, end - begin));
     std::uint64_t workgroups = 0;
     for (std::size_t index = begin; index < end; ++index) {
       const Group& group = work_->groups[order[index]];
       const std::uint64_t vertexGroups = vertexGroupsOf(group);
-      workgroups += vertexGroups * divideUp(group.instances, instancesEach);
+      const std::uint64_t shares = divideUp(group.instances, mostInstances);
+      workgroups += vertexGroups * shares;
       abi::GroupRecord record{};
       record.workgroupEnd =
           static_cast<std::uint32_t>(std::min<std::uint64_t>(workgroups, notUsed));
@@ -237,19 +238,19 @@ Result<void> Encoder::addDispatches() {
       record.normalStride = group.key.strides[1];
       record.tangentStride = group.key.strides[2];
       record.previousStride = group.key.strides[3];
+      // About the same for all, so that workgroups take about the same time.
+      record.instancesEach = static_cast<std::uint32_t>(divideUp(group.instances, shares));
       store(tables, groupRecords + index * abi::GROUP_WORDS, record);
     }
     const Group& group = work_->groups[order[begin]];
     const Variant& variant = group.variant;
     const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
-                             static_cast<std::uint32_t>(end - begin),
-                             0,
-                             instanceRecords,
-                             instancesEach,
+                             static_cast<std::uint32_t>(end - begin), 0, instanceRecords,
                              verticesPerInvocation_};
     if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
     Dispatch& dispatch = dispatches_.back();
     dispatch.windows = group.key.windows;
+    dispatch.instancesPerInvocation = mostInstances;
     const bool readsPoses = variant.method == Method::linear && !plan_->sizes.isScene;
     dispatch.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
     // A kernel that may name the results counts as one that reads them.
@@ -362,7 +363,7 @@ void Encoder::markEvenlySpaced(std::uint32_t firstRecord) {
     if (isSnormPosition(group.variant.positions) && !haveOneBox(tables, records)) continue;
     const std::size_t word = groups + place * abi::GROUP_WORDS;
     auto record = abi::load<abi::GroupRecord>(tables, word);
-    record.evenlySpaced = 1;
+    record.instancesEach |= abi::EVENLY_SPACED;
     store(tables, word, record);
   }
 }
@@ -407,7 +408,8 @@ void Encoder::appendCulledDispatches() {
     DispatchCommand& dispatch = dispatches_[first + index].command;
     abi::SkinPush push = pushOf(dispatches_[first + index]);
     store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
-          abi::CulledDispatchRecord{push.groups, push.groupCount, push.instancesPerInvocation, 0});
+          abi::CulledDispatchRecord{push.groups, push.groupCount,
+                                    dispatches_[first + index].instancesPerInvocation, 0});
     // Only the GPU knows the number of workgroups. Excess ones find no instance in the last group.
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);

@@ -45,6 +45,7 @@ class Encoder {
     BufferRole joints = BufferRole::palettes;  ///< that the kernel reads
     std::uint32_t poseBuffer = 0;              ///< of the palette kernel of a scene
     ByStream<std::uint32_t> windows{};
+    std::uint32_t instancesPerInvocation = 0;  ///< at most; of a skin kernel
   };
 
   Result<void> addPaletteDispatches();
