@@ -1,5 +1,6 @@
 # dermis::core, dermis::verify and dermis::vulkan must not link a Vulkan loader, throw exceptions, have writable global data, or
-# contain functions of GLM whose behavior depends on the engine's settings of GLM.
+# contain functions of GLM whose behavior depends on the engine's settings of GLM. What the other libraries use of dermis::core must be
+# declared with DERMIS_CORE_API, or a shared build does not link.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 foreach(component IN ITEMS core verify vulkan)
@@ -31,3 +32,42 @@ foreach(component IN ITEMS core verify vulkan)
     wrong("libdermis_${component}.a:${problems}")
   endif()
 endforeach()
+
+# The functions of dermis:: in a library: "A::f" of "A::f(int) const".
+function(list_functions names library kind)
+  run(symbols "List what is ${kind} in ${library}" "${nm}" -C "--${kind}-only" "${library}")
+  string(REGEX MATCHALL "[UTtW] dermis::[^\n(<]*[(]" lines "${symbols}")
+  string(REGEX REPLACE "[UTtW] dermis::([^;]*)[(]" "\\1" lines "${lines}")
+  string(REGEX REPLACE "\\[abi:[a-z0-9]*\\]" "" lines "${lines}")
+  list(REMOVE_DUPLICATES lines)
+  set(${names} "${lines}" PARENT_SCOPE)
+endfunction()
+
+set(declarations)
+file(GLOB_RECURSE headers "${sourceFolder}/engine/include/*.h" "${sourceFolder}/engine/src/core/*.h")
+foreach(header IN LISTS headers)
+  file(READ "${header}" text)
+  string(APPEND declarations "${text}")
+endforeach()
+list_functions(defined "${prefix}/${libFolder}/libdermis_core.a" defined)
+set(problems)
+set(count 0)
+foreach(component IN ITEMS cpu gltf verify vulkan)
+  list_functions(used "${prefix}/${libFolder}/libdermis_${component}.a" undefined)
+  foreach(function IN LISTS used)
+    if(NOT function IN_LIST defined)
+      continue()
+    endif()
+    math(EXPR count "${count} + 1")
+    string(REGEX MATCH "([^:]+)::[^:]+$" ignored "${function}")
+    set(class "${CMAKE_MATCH_1}")
+    string(REGEX MATCH "[^:]+$" name "${function}")
+    if(NOT declarations MATCHES "DERMIS_CORE_API[^;{}]*[ *&~]${name}[(]" AND
+       (class STREQUAL "" OR NOT declarations MATCHES "(class|struct) DERMIS_CORE_API ${class} "))
+      string(APPEND problems "\n  ${function}, which libdermis_${component}.a uses")
+    endif()
+  endforeach()
+endforeach()
+if(problems OR count LESS 30)
+  wrong("Of ${count} functions of dermis::core that other libraries use, these are not declared with DERMIS_CORE_API:${problems}")
+endif()

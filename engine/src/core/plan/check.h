@@ -12,7 +12,7 @@
 
 namespace dermis {
 
-Error invalid(std::string message);
+DERMIS_CORE_API Error invalid(std::string message);
 /// "WHAT of VALUE is not a multiple of DIVISOR".
 Error notAMultiple(const std::string& what, std::uint64_t value, std::uint64_t divisor);
 /// For a number that is not a value of an enum: "WHAT is 7, which is not a value of Method".

@@ -32,8 +32,8 @@ struct PlanSizes {
       0;  ///< of a scene: words of visibility, records of history; 0 if the GPU chooses nothing
 
   /// Of one buffer. `tables` is the size of the tables in bytes.
-  BufferRequirement requirement(BufferRole role, std::uint64_t tables,
-                                const DeviceLimits& limits) const;
+  DERMIS_CORE_API BufferRequirement requirement(BufferRole role, std::uint64_t tables,
+                                                const DeviceLimits& limits) const;
 };
 
 /// The buffers that the commands of a plan name. Their sizes are at most storage buffer ranges, but

@@ -45,11 +45,11 @@ struct SceneOwner {
   void (*meshRemoved)(void* user, std::uint64_t offset) = nullptr;  ///< optional
 };
 
-Result<void> checkSetup(const SceneSetup& setup);
+DERMIS_CORE_API Result<void> checkSetup(const SceneSetup& setup);
 /// With capacities that are whole units.
-SceneSetup rounded(SceneSetup setup);
+DERMIS_CORE_API SceneSetup rounded(SceneSetup setup);
 /// The initial sizes of a scene's buffers; for poses, of the first buffer of each kind.
-PlanSizes sceneSizes(const SceneSetup& setup);
+DERMIS_CORE_API PlanSizes sceneSizes(const SceneSetup& setup);
 
 /// A buffer that the owner created.
 struct SceneBufferMemory {
@@ -229,7 +229,7 @@ struct SceneBooks {
 
   // meshes_and_poses.cpp
   /// Keeps the bytes, or the owner does; null if the owner has them already.
-  Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
+  DERMIS_CORE_API Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
   Result<void> checkWrite(PoseHandle handle, bool writtenByGpu) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
   /// Where the matrices of the current slot are in the buffer of the pose.
@@ -237,9 +237,9 @@ struct SceneBooks {
     return (pose.joints.offset + std::uint64_t{pose.slot} * pose.jointCount) * sizeof(JointMatrix);
   }
   /// Fails for a pose that the CPU writes.
-  Result<BufferPart> posePart(PoseHandle pose) const;
+  DERMIS_CORE_API Result<BufferPart> posePart(PoseHandle pose) const;
   /// The memory that the CPU writes.
-  std::span<JointMatrix> matricesOf(const ScenePose& pose);
+  DERMIS_CORE_API std::span<JointMatrix> matricesOf(const ScenePose& pose);
   void upload(PoseHandle pose) {
     if (poseBuffers_[poses_.at(pose.index).buffer].buffer.mapped == nullptr)
       poseUploads_.push_back(pose);
@@ -280,11 +280,11 @@ struct SceneBooks {
 
   // frame.cpp
   /// Collects all work (`work_`). None of it counts as done before `commit`.
-  Result<void> gather();
+  DERMIS_CORE_API Result<void> gather();
   /// `gather`, encoded as a plan.
-  Result<void> plan(Plan& out);
-  Result<void> commit();
-  Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
+  DERMIS_CORE_API Result<void> plan(Plan& out);
+  DERMIS_CORE_API Result<void> commit();
+  DERMIS_CORE_API Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
   void begin(std::uint64_t frame, std::uint64_t completedFrame);
   void readBackComplete();
   void listGrowth();
@@ -419,7 +419,8 @@ struct SceneBooks {
 
 /// How owners reach their scene.
 struct SceneAccess {
-  static Result<std::unique_ptr<Scene>> create(const SceneSetup& setup, const SceneOwner& owner);
+  DERMIS_CORE_API static Result<std::unique_ptr<Scene>> create(const SceneSetup& setup,
+                                                               const SceneOwner& owner);
   static SceneBooks& books(Scene& scene) { return *scene.books_; }
   /// After which the current plan can no longer be committed.
   static SceneBooks& changed(Scene& scene) { return scene.changed(); }
