@@ -56,25 +56,40 @@ uint[12] recordWords(uvec4 position, uvec4 normal, uvec4 tangent) {
 #include "cpu_device/wide_stores.glsl"
 #elif defined(STAGED)
 layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsUnits { uvec4 positionsUnits[]; };
+layout(set = 0, binding = BINDING_POSITIONS, std430) writeonly buffer PositionsPairs { uvec2 positionsPairs[]; };
 
-// A GPU writes memory in units of 32 or 64 bytes. If each invocation stored the words of a 24-byte record one by one, neighbors
-// would write to the same units six times. Therefore the records of a workgroup are first gathered in shared memory. There is space
-// for two sets: the next instance may be written while this one is read, so one barrier per instance is enough.
+// A GPU writes memory in units of 32 or 64 bytes. If each invocation stored the words of a record one by one, neighbors would write
+// to the same units several times. So records are stored 16 or 8 bytes at a time. Where they begin elsewhere, the records of a
+// workgroup are first gathered in shared memory. There is space for two sets: the next instance may be written while this one is
+// read, so one barrier per instance is enough.
 const uint RECORD_WORDS = RECORD / 4u;
 const uint STAGED_WORDS = gl_WorkGroupSize.x * RECORD_WORDS + 3u;
 shared uint staged[STAGED_WORDS * 2u];
 uint stagedRecords;     // records of this workgroup: fewer than its invocations if fewer vertices are left in the group
 uint firstStaged = 0u;  // start of the half that is filled next
 
+// Stores a record of the workgroup whose records begin at the word `begin`, unless they begin at no multiple of 8 bytes.
+bool storeUnits(uint begin, uint place, uint words[12]) {
+  bool byUnits = RECORD % 16u == 0u && begin % 4u == 0u;
+  bool byPairs = RECORD % 8u == 0u && begin % 2u == 0u;
+  if (gl_LocalInvocationID.x < stagedRecords) {
+    if (byUnits) {
+      for (uint i = 0u; i < RECORD_WORDS; i += 4u) {
+        positionsUnits[place / 16u + i / 4u] = uvec4(words[i], words[i + 1u], words[i + 2u], words[i + 3u]);
+      }
+    } else if (byPairs) {
+      for (uint i = 0u; i < RECORD_WORDS; i += 2u) positionsPairs[place / 8u + i / 2u] = uvec2(words[i], words[i + 1u]);
+    }
+  }
+  return byUnits || byPairs;
+}
+
 void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint own = gl_LocalInvocationID.x;
   uint begin = place / 4u - own * RECORD_WORDS;  // word at which the workgroup's records begin
   uint first = begin % 4u;                       // relative to the 16-byte unit that contains it
   uint words[12] = recordWords(position, normal, tangent);
-  if (RECORD == 16u && first == 0u) {
-    if (own < stagedRecords) positionsUnits[place / 16u] = uvec4(words[0], words[1], words[2], words[3]);
-    return;
-  }
+  if (storeUnits(begin, place, words)) return;
   uint filled = firstStaged;
   firstStaged = STAGED_WORDS - filled;
   for (uint i = 0u; i < RECORD_WORDS; ++i) staged[filled + first + own * RECORD_WORDS + i] = words[i];

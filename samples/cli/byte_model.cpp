@@ -91,7 +91,11 @@ struct Layout {
 double storedBytes(const Layout& layout, const vulkan::PipelineDescription& pipeline,
                    double stride) {
   const std::uint32_t recordBytes = pipeline.constants[abi::CONSTANT_RECORD];
-  if (pipeline.module.ends_with("_staged")) return stride;
+  if (pipeline.module.ends_with("_staged")) {
+    // 16 or 8 bytes at a time, or through workgroup memory.
+    const double unit = recordBytes % 16 == 0 ? 16 : recordBytes % 8 == 0 ? 8 : stride;
+    return stride / unit * std::min(stride, sector);
+  }
   if (recordBytes != 0 && recordBytes != abi::RECORD_IN_PAIRS)
     return std::max(recordBytes / 16.0, 1.0) * std::min(stride, sector);
   double stores = 0;
@@ -165,9 +169,6 @@ std::optional<std::vector<ByteModel>> byteModels() {
                                  {"float32x3", float32x3, none}}) {
       for (const auto& [way, limits] :
            {std::pair{"words", &words}, {"staged", &staged}, {"wide", &wide}}) {
-        // Vertices of 24 bytes are not staged.
-        if (limits == &staged && layout.positions == float32x3 && layout.normals == float32x3)
-          continue;
         std::optional<ByteModel> model = modelOf(layout, method, way, *limits);
         if (!model) return std::nullopt;
         models.push_back(std::move(*model));

@@ -38,9 +38,9 @@ class OutputPlacer {
       std::uint64_t& end = sizes_[output_.arrangement == Arrangement::separate ? stream : 0];
       if (isTogether(stream)) {
         if (inVertex == 0) {
-          first = end;
+          first = end + output_.before;
           // Kernels that store 8 bytes at a time need instances at multiples of 8 bytes.
-          end = (end + vertices * vertexSize + 7) / 8 * 8;
+          end = (first + vertices * vertexSize + 7) / 8 * 8;
         }
         attribute.offset = first + inVertex;
         attribute.stride = vertexSize;

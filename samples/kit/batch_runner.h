@@ -51,7 +51,8 @@ struct OutputLayout {
   bool motion = false;
   bool bounds = false;
   Arrangement arrangement = Arrangement::interleaved;
-  std::uint32_t gap = 0;  ///< bytes after each vertex (interleaved) or element; never written
+  std::uint32_t gap = 0;     ///< bytes after each vertex (interleaved) or element; never written
+  std::uint32_t before = 0;  ///< bytes before each instance (interleaved); never written
 };
 
 /// The buffers of a batch.

@@ -4,12 +4,14 @@
     tests/bench/compilers.py PROGRAM            compares with compilers.tsv
     tests/bench/compilers.py PROGRAM --update   writes compilers.tsv
     tests/bench/compilers.py PROGRAM --goals    counts vector instructions by loop; better with the Mesa of unpack_mesa.sh
+    tests/bench/compilers.py PROGRAM --intel SHIM   counts the kernels that Intel's compiler makes at full SIMD width
 
 PROGRAM is dermis_compiler_table. RADV_FORCE_FAMILY makes RADV a device without hardware, which compiles and executes nothing.
 Fails if a kernel cannot be compiled, spills registers or uses scratch memory; and, if Mesa is the version of the table, if a kernel
 has fewer waves or over 3 % more instructions than in the table. Ends with 77 if there is no RADV.
 
-The driver is that of VK_DRIVER_FILES, otherwise Debian's."""
+The driver is that of VK_DRIVER_FILES, otherwise Debian's. For Intel it must name ANV, and SHIM is Mesa's
+libintel_noop_drm_shim.so, the device without hardware; no package has it (docs/gpus.md says how to build it)."""
 
 import collections
 import os
@@ -25,11 +27,11 @@ debian = "/usr/share/vulkan/icd.d/radeon_icd.x86_64.json"
 chips = ["polaris10", "vega10", "navi21", "gfx1100"]
 
 
-def compiled(program, chip, *arguments):
+def compiled(program, chip, *arguments, **settings):
     """The lines of PROGRAM for a chip: the kernel, and its statistics by name, which are empty where something failed."""
     driver = os.environ.get("VK_DRIVER_FILES", debian)
     environment = dict(os.environ, RADV_FORCE_FAMILY=chip, VK_DRIVER_FILES=driver, VK_ICD_FILENAMES=driver,
-                       MESA_SHADER_CACHE_DISABLE="true")
+                       MESA_SHADER_CACHE_DISABLE="true", **settings)
     done = subprocess.run([program, *arguments], env=environment, stdout=subprocess.PIPE, text=True)
     if done.returncode != 0:
         yield f"exit status {done.returncode}", {}
@@ -143,12 +145,36 @@ def goals(program):
                 print(f"  {title:46} {found[0]:4} {found[0] + found[1] / 4:6.0f} {waves[f'{layout}; words; {kernel}']:>4}")
 
 
+def intel(program, shim):
+    total = full = 0
+    bad = False
+    for platform, width in {"skl": 16, "tgl": 16, "dg2": 16, "mtl": 16, "lnl": 32, "bmg": 32}.items():
+        halves = collections.Counter()
+        now = list(compiled(program, platform, LD_PRELOAD=shim, INTEL_STUB_GPU_PLATFORM=platform))
+        for kernel, values in now:
+            if not values or int(values["Spill Count"]) or int(values["Scratch Memory Size"]):
+                print("fails or spills: ", platform, kernel)
+                bad = True
+            elif int(values["subgroup"]) < width:
+                halves[re.search(r"kernel for (\w+)", kernel)[1] + (", morph targets" if "morph" in kernel else "")] += 1
+        bad |= not now
+        wide = len(now) - halves.total()
+        total += len(now)
+        full += wide
+        print(f"{platform}: {wide} of {len(now)} kernels at full width; at half: " +
+              "; ".join(f"{name} {count}" for name, count in sorted(halves.items())))
+    print(f"{full} of {total}")
+    return bad
+
+
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     if not Path(os.environ.get("VK_DRIVER_FILES", debian)).exists():
         print("compilers.py: no RADV on this machine")
         return 77
+    if "--intel" in sys.argv:
+        return intel(sys.argv[1], sys.argv[3])
     if "--goals" in sys.argv:
         return goals(sys.argv[1])
     return check(sys.argv[1], "--update" in sys.argv)

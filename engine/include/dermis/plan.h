@@ -45,13 +45,13 @@ struct DeviceLimits {
   /// `scalarBlockLayout`, and that a uniform texel buffer of 4-byte texels can hold a whole storage
   /// buffer range: `maxStorageBufferRange` is at most 4 × maxTexelBufferElements.
   bool texelBuffers = false;
-  /// Whether kernels collect interleaved vertices in workgroup memory, so that consecutive
-  /// invocations store consecutive blocks of 16 bytes. Needs no device feature. Used only if
+  /// Whether kernels store interleaved vertices 16 or 8 bytes at a time; where they begin at no
+  /// multiple of 8 bytes, through workgroup memory. Needs no device feature. Used only if
   /// - `texelBuffers` is false;
   /// - the method is `linear` or `dualQuaternion`;
   /// - there are no previous positions or results;
-  /// - positions, normals and tangents are adjacent, without gaps, and take 8, 12, 16 or 32 bytes
-  ///   together.
+  /// - positions, normals and tangents are adjacent, without gaps, and take 8, 12, 16, 24 or
+  ///   32 bytes together.
   bool stagedStores = false;
   /// Whether this build has the kernels of comparison methods (`DERMIS_COMPARISON_METHODS`).
   bool comparisonMethods = true;

@@ -136,7 +136,7 @@ std::string pipelineName(const Variant& variant) {
   if (variant.bounds) text += ", bounds";
   if (variant.recordBytes != 0)
     text += ", " + std::to_string(variant.recordBytes) +
-            (variant.staged ? " bytes per vertex through workgroup memory" : " bytes per store");
+            (variant.staged ? " bytes per vertex" : " bytes per store");
   if (variant.pairs) text += ", 8 bytes per store";
   text += std::string(", for ") + (variant.fullInfluences ? "exactly " : "") +
           (variant.influences == 0 ? std::string("any number of")

@@ -244,7 +244,7 @@ struct DeviceDescription {
   /// are the same to the bit. If not set: true for CPU devices (measured on lavapipe), false for
   /// others (a guess).
   std::optional<bool> texelBuffers;
-  /// Whether kernels may store interleaved vertices through workgroup memory
+  /// Whether kernels may store interleaved vertices widely, or through workgroup memory
   /// (`DeviceLimits::stagedStores`). Results are the same to the bit. If not set: true for discrete
   /// GPUs (a guess) but those of AMD and Intel, false for others.
   std::optional<bool> stagedStores;

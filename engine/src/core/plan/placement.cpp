@@ -100,13 +100,12 @@ void widenStores(const Job& job, Variant& variant) {
     variant.wide[stream] = isWide(streams, stream);
 }
 
-/// Whether vertices can go through workgroup memory (`DeviceLimits::stagedStores`). For 24 bytes an
-/// H200 is faster without (docs/gpus.md).
+/// `DeviceLimits::stagedStores`.
 bool canBeStaged(const Job& job, const OutputStreams& streams, const DeviceLimits& limits) {
   return limits.stagedStores && !limits.texelBuffers &&
          limits.maxStorageBuffersPerStage >= storageBuffersWanted &&
          (job.method == Method::linear || job.method == Method::dualQuaternion) &&
-         !job.places.hasMotion() && !hasResult(job) && isRecord(job) && recordSize(job) != 24 &&
+         !job.places.hasMotion() && !hasResult(job) && isRecord(job) &&
          job.places[Stream::positions].stride == recordSize(job) &&
          (recordSize(job) == streams[0].size || standsTogether(streams));
 }

@@ -51,7 +51,8 @@ struct Variant {
   /// If not 0: one store writes position, normal and tangent of a vertex, which are adjacent, and
   /// this is its size in bytes: 8, 12, 16, 24 or 32. Only with `staged` or `texels`.
   std::uint8_t recordBytes = 0;
-  /// Whether vertices of `recordBytes` go through workgroup memory (`DeviceLimits::stagedStores`).
+  /// Whether vertices of `recordBytes` are stored 16 or 8 bytes at a time
+  /// (`DeviceLimits::stagedStores`).
   bool staged = false;
   /// Maximum influences of a vertex: 1, 2, 4, or 0 for any number.
   std::uint8_t influences = 0;
