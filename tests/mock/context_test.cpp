@@ -20,6 +20,8 @@ namespace {
 
 const std::vector<std::string> neededFunctions{"vkGetDeviceProcAddr",
                                                "vkGetPhysicalDeviceProperties",
+                                               "vkGetPhysicalDeviceProperties2",
+                                               "vkEnumerateDeviceExtensionProperties",
                                                "vkCreateShaderModule",
                                                "vkDestroyShaderModule",
                                                "vkCreateDescriptorSetLayout",

@@ -1,6 +1,7 @@
 #include "mock_vulkan.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -184,6 +185,40 @@ void VKAPI_CALL getPhysicalDeviceProperties(VkPhysicalDevice,
   properties->vendorID = mock->vendor;
 }
 
+/// An NVIDIA H200, and a Radeon RX 6900 XT.
+void VKAPI_CALL getPhysicalDeviceProperties2(VkPhysicalDevice device,
+                                             VkPhysicalDeviceProperties2* properties) {
+  getPhysicalDeviceProperties(device, &properties->properties);
+  auto* next = static_cast<VkBaseOutStructure*>(properties->pNext);
+  if (next->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_SM_BUILTINS_PROPERTIES_NV) {
+    auto* nvidia = reinterpret_cast<VkPhysicalDeviceShaderSMBuiltinsPropertiesNV*>(next);
+    nvidia->shaderSMCount = 132;
+    nvidia->shaderWarpsPerSM = 64;
+  } else {
+    ASSERT_EQ(next->sType, VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_CORE_PROPERTIES_AMD);
+    auto* amd = reinterpret_cast<VkPhysicalDeviceShaderCorePropertiesAMD*>(next);
+    amd->shaderEngineCount = 4;
+    amd->shaderArraysPerEngineCount = 2;
+    amd->computeUnitsPerShaderArray = 10;
+    amd->simdPerComputeUnit = 2;
+    amd->wavefrontsPerSimd = 16;
+    amd->wavefrontSize = 64;
+  }
+}
+
+VkResult VKAPI_CALL enumerateDeviceExtensionProperties(VkPhysicalDevice, const char*,
+                                                       std::uint32_t* count,
+                                                       VkExtensionProperties* extensions) {
+  if (extensions == nullptr) {
+    *count = static_cast<std::uint32_t>(mock->physicalExtensions.size());
+    return VK_SUCCESS;
+  }
+  for (std::uint32_t i = 0; i < *count; ++i)
+    std::snprintf(extensions[i].extensionName, sizeof(extensions[i].extensionName), "%s",
+                  mock->physicalExtensions[i]);
+  return VK_SUCCESS;
+}
+
 void VKAPI_CALL cmdBindPipeline(VkCommandBuffer, VkPipelineBindPoint point, VkPipeline pipeline) {
   mock->next.code = mock->codeOfPipeline.at(pipeline);
   mock->commands.push_back(point == VK_PIPELINE_BIND_POINT_COMPUTE ? "bind pipeline"
@@ -248,6 +283,8 @@ PFN_vkVoidFunction find(const char* name) {
 #define MOCK_FUNCTION(vulkanName, function) \
   {vulkanName, reinterpret_cast<PFN_vkVoidFunction>(function)}
       MOCK_FUNCTION("vkGetPhysicalDeviceProperties", getPhysicalDeviceProperties),
+      MOCK_FUNCTION("vkGetPhysicalDeviceProperties2", getPhysicalDeviceProperties2),
+      MOCK_FUNCTION("vkEnumerateDeviceExtensionProperties", enumerateDeviceExtensionProperties),
       MOCK_FUNCTION("vkCreateShaderModule", createShaderModule),
       MOCK_FUNCTION("vkDestroyShaderModule", destroyShaderModule),
       MOCK_FUNCTION("vkCreateDescriptorSetLayout", createDescriptorSetLayout),

@@ -71,6 +71,7 @@ struct MockVulkan {
   VkPhysicalDeviceLimits limits{};
   VkPhysicalDeviceType deviceType = VK_PHYSICAL_DEVICE_TYPE_OTHER;
   std::uint32_t vendor = 0;
+  std::vector<const char*> physicalExtensions;  ///< of the physical device
   std::vector<const char*> extensions;
   const VkAllocationCallbacks* allocator = nullptr;
 

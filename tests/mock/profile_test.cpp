@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abi.h"
@@ -159,6 +160,21 @@ TEST(DefaultsTest, CpuDevicesDoNotStageAndSkinManyInstances) {
   EXPECT_EQ(context->tuning().minWorkgroups, 0u);
   description.stagedStores = true;
   EXPECT_TRUE(vulkan::Context::create(description)->limits().stagedStores);
+}
+
+// As many workgroups as the GPU has place for at a time, where it tells.
+TEST(DefaultsTest, WorkgroupsFillTheGpu) {
+  MockVulkan mock;
+  const auto workgroups = [&](VkPhysicalDeviceType type, std::vector<const char*> extensions) {
+    mock.deviceType = type;
+    mock.physicalExtensions = std::move(extensions);
+    return vulkan::Context::create(mock.description())->tuning().minWorkgroups;
+  };
+  const VkPhysicalDeviceType gpu = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+  EXPECT_EQ(workgroups(gpu, {"VK_KHR_maintenance1"}), 2048u);
+  EXPECT_EQ(workgroups(gpu, {"VK_KHR_maintenance1", "VK_NV_shader_sm_builtins"}), 4224u);
+  EXPECT_EQ(workgroups(gpu, {"VK_AMD_shader_core_properties"}), 2560u);
+  EXPECT_EQ(workgroups(VK_PHYSICAL_DEVICE_TYPE_CPU, {"VK_NV_shader_sm_builtins"}), 0u);
 }
 
 TEST(DefaultsTest, DiscreteGpusStageUnlessTheirCompilerMergesStores) {

@@ -163,7 +163,7 @@ Result<Context> Context::create(const DeviceDescription& description) {
   const CpuDeviceFeatures features = readFeatures(description);
 
   state.limits.comparisonMethods = !kernels::find("skin_comparison").empty();
-  const DeviceDefaults defaults = defaultsOf(properties.deviceType, properties.vendorID);
+  const DeviceDefaults defaults = defaultsOf(state.table, description.physicalDevice, properties);
   state.tuning = defaults.tuning;
   state.limits.stagedStores = description.stagedStores.value_or(defaults.stagedStores);
   if (description.texelBuffers.value_or(defaults.texelBuffers) && features.scalarBlockLayout &&

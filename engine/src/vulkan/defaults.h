@@ -4,6 +4,7 @@
 #include <vulkan/vulkan_core.h>
 
 #include "dermis/plan.h"
+#include "vulkan/dispatch_table.h"
 
 namespace dermis::vulkan {
 
@@ -14,6 +15,7 @@ struct DeviceDefaults {
   Tuning tuning;
 };
 
-DeviceDefaults defaultsOf(VkPhysicalDeviceType type, std::uint32_t vendor);
+DeviceDefaults defaultsOf(const DispatchTable& table, VkPhysicalDevice device,
+                          const VkPhysicalDeviceProperties& properties);
 
 }  // namespace dermis::vulkan

@@ -52,6 +52,9 @@ Result<DispatchTable> loadDispatchTable(const DeviceDescription& description) {
   DispatchTable table;
   Loader loader(description);
   loader.instanceFunction("vkGetPhysicalDeviceProperties", table.getPhysicalDeviceProperties);
+  loader.instanceFunction("vkGetPhysicalDeviceProperties2", table.getPhysicalDeviceProperties2);
+  loader.instanceFunction("vkEnumerateDeviceExtensionProperties",
+                          table.enumerateDeviceExtensionProperties);
   table.getDeviceProcAddr = loader.deviceProcAddr();
 
   loader.deviceFunction("vkCreateShaderModule", table.createShaderModule);

@@ -15,6 +15,8 @@ namespace dermis::vulkan {
 struct DispatchTable {
   PFN_vkGetDeviceProcAddr getDeviceProcAddr = nullptr;
   PFN_vkGetPhysicalDeviceProperties getPhysicalDeviceProperties = nullptr;
+  PFN_vkGetPhysicalDeviceProperties2 getPhysicalDeviceProperties2 = nullptr;
+  PFN_vkEnumerateDeviceExtensionProperties enumerateDeviceExtensionProperties = nullptr;
 
   PFN_vkCreateShaderModule createShaderModule = nullptr;
   PFN_vkDestroyShaderModule destroyShaderModule = nullptr;
