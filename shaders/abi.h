@@ -55,7 +55,8 @@ DERMIS_CONSTANT CONSTANT_SCALES = 11u;  // 0 or 1: whether palettes may be two-p
 // 0 or 1: whether every vertex has exactly as many influences as CONSTANT_INFLUENCES says.
 DERMIS_CONSTANT CONSTANT_FULL = 12u;
 DERMIS_CONSTANT CONSTANT_RECORD = 13u;  // bytes of all attributes, stored together; or RECORD_*
-DERMIS_CONSTANT CONSTANT_COUNT = 14u;
+DERMIS_CONSTANT CONSTANT_RIGID = 14u;   // 0 or 1: whether joints are taken for rigid
+DERMIS_CONSTANT CONSTANT_COUNT = 15u;
 DERMIS_CONSTANT RECORD_APART = 0u;     // each attribute is stored separately
 DERMIS_CONSTANT RECORD_IN_PAIRS = 1u;  // float32x3 positions and normals, 8 bytes at a time
 

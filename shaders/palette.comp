@@ -18,6 +18,7 @@
 
 layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
+layout(constant_id = CONSTANT_RIGID) const bool RIGID = false;
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
@@ -101,14 +102,22 @@ void main() {
     ScaleShear scaleShear = ScaleShear(vec3(1.0), vec3(0.0));
     // If an entry is larger than 2, products in isRigid may overflow, and comparisons with NaN may give any result.
     float largest = max(largestComponent(r0.xyz), max(largestComponent(r1.xyz), largestComponent(r2.xyz)));
+    bool rigid = largest <= 2.0 && isRigid(r0.xyz, r1.xyz, r2.xyz);
     if (!isFinite(r0) || !isFinite(r1) || !isFinite(r2)) {
       atomicAdd(nonFiniteJoints, 1u);
       rotation = vec4(uintBitsToFloat(0x7fc00000u));
-    } else if (largest <= 2.0 && isRigid(r0.xyz, r1.xyz, r2.xyz)) {
-      rotation = quaternionOfRows(r0.xyz, r1.xyz, r2.xyz);
     } else {
-      atomicAdd(nonRigidJoints, 1u);
-      polarParts(r0.xyz, r1.xyz, r2.xyz, largest, rotation, scaleShear);
+      if (!rigid) atomicAdd(nonRigidJoints, 1u);
+      if (RIGID || rigid) {
+        // Of another matrix it makes a unit quaternion, too, if no square overflows.
+        float scale = RIGID && !rigid ? powerScale(max(largest, 1.0)) : 1.0;
+        precise vec3 n0 = r0.xyz * scale;
+        precise vec3 n1 = r1.xyz * scale;
+        precise vec3 n2 = r2.xyz * scale;
+        rotation = quaternionOfRows(n0, n1, n2);
+      } else {
+        polarParts(r0.xyz, r1.xyz, r2.xyz, largest, rotation, scaleShear);
+      }
     }
     vec4 dual = dualPart(rotation, vec3(r0.w, r1.w, r2.w));
 #ifdef LOGARITHMS

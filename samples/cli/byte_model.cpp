@@ -112,7 +112,7 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   needs.method = method;
   needs.layout.positions = layout.positions;
   needs.layout.normals = layout.normals;
-  needs.mayScale = false;
+  needs.promise = JointPromise::scaleIgnored;
   needs.mesh = MeshInfo();
   needs.mesh->minInfluences = needs.mesh->maxInfluences = influences;
   Tuning tuning;

@@ -55,7 +55,7 @@ bool isRigid(const JointMatrix& joint) {
 std::vector<samples::SkinRequest> requestsOf(const Scene& scene, const ScenePose& pose) {
   std::vector<samples::SkinRequest> requests = skinRequests(scene, pose);
   for (samples::SkinRequest& request : requests)
-    request.mayScale = !std::ranges::all_of(request.pose, isRigid);
+    if (std::ranges::all_of(request.pose, isRigid)) request.promise = JointPromise::scaleIgnored;
   return requests;
 }
 
@@ -130,7 +130,7 @@ class MethodComparer {
     }
     for (const samples::SkinRequest& request : instance_) {
       comparison_.vertices += request.mesh->vertexCount();
-      comparison_.scales = comparison_.scales || request.mayScale;
+      comparison_.scales = comparison_.scales || request.promise == JointPromise::scaling;
     }
     for (const std::vector<JointMatrix>& palette : pose.poses)
       comparison_.joints += static_cast<std::uint32_t>(palette.size());
@@ -295,7 +295,7 @@ class MethodComparer {
       std::vector<cpu::Instance>& all = instances.emplace_back(*count);
       for (std::uint32_t i = 0; i < *count; ++i) {
         all[i].pose = part.pose;
-        all[i].mayScale = part.mayScale;
+        all[i].promise = part.promise;
         all[i].morphs = part.morphs;
         all[i].output.fill(output.data() + places->size * i);
       }

@@ -58,11 +58,12 @@ class OutputPlacer {
   ByStream<std::uint64_t>& sizes_;
 };
 
-std::uint32_t addPose(BatchLayout& layout, std::span<const JointMatrix> pose, bool mayScale) {
+std::uint32_t addPose(BatchLayout& layout, std::span<const JointMatrix> pose,
+                      JointPromise promise) {
   PoseDescription palette;
   palette.jointCount = static_cast<std::uint32_t>(pose.size());
   palette.matrixOffset = layout.posesSize;
-  palette.mayScale = mayScale;
+  palette.promise = promise;
   layout.posesSize += pose.size_bytes();
   layout.poseDescriptions.push_back(palette);
   layout.poses.push_back(pose);
@@ -82,7 +83,7 @@ BatchLayout layOutBatch(std::span<const SkinRequest> requests, const OutputLayou
     Job job;
     job.mesh = request.mesh->info();
     job.meshOffset = entry->second;
-    job.pose = addPose(layout, request.pose, request.mayScale);
+    job.pose = addPose(layout, request.pose, request.promise);
     job.method = request.method;
     job.morphs = request.morphs;
     job.box = request.box;

@@ -28,7 +28,7 @@ namespace dermis::samples {
 struct SkinRequest {
   const PackedMesh* mesh = nullptr;
   std::span<const JointMatrix> pose;
-  bool mayScale = true;
+  JointPromise promise = JointPromise::scaling;
   Method method = Method::dualQuaternion;
   std::span<const MorphWeight> morphs = {};
   Box box = {};  ///< for snorm16 positions

@@ -64,7 +64,7 @@ cpu::Instance CpuRunner::instanceOf(const Job& job) {
   };
   cpu::Instance instance;
   instance.pose = layout_.poses[job.pose];
-  instance.mayScale = layout_.poseDescriptions[job.pose].mayScale;
+  instance.promise = layout_.poseDescriptions[job.pose].promise;
   instance.output = {{memory(0), memory(1), memory(2), memory(3)}};
   instance.box = job.box;
   instance.morphs = job.morphs;

@@ -67,12 +67,13 @@ struct Scene {
       : mesh(std::move(skinned)),
         method(by),
         rigidity(joints),
-        mayScale(joints != samples::Rigidity::rigid) {}
+        promise(joints == samples::Rigidity::rigid ? JointPromise::scaleIgnored
+                                                   : JointPromise::scaling) {}
 
   OwnedMesh mesh;
   Method method;
   samples::Rigidity rigidity;
-  bool mayScale;
+  JointPromise promise;
   samples::OutputLayout output;
   std::vector<MorphWeight> morphs;
 };
@@ -88,7 +89,7 @@ void measure(benchmark::State& state, Scene scene) {
     samples::SkinRequest& request = requests.emplace_back();
     request.mesh = &packed;
     request.pose = pose;
-    request.mayScale = scene.mayScale;
+    request.promise = scene.promise;
     request.method = scene.method;
     request.morphs = scene.morphs;
     request.box = {{-4, -4, -4}, {4, 4, 4}};
@@ -168,7 +169,7 @@ void registerAll() {
       [] { return Scene(evenMesh(4), Method::dualQuaternion, samples::Rigidity::shear); });
   add("method/may_scale", [] {
     Scene scene(evenMesh(4));
-    scene.mayScale = true;
+    scene.promise = JointPromise::scaling;
     return scene;
   });
   add("palettes/shear", [] {

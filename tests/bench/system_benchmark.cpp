@@ -82,7 +82,8 @@ class Scene {
     for (std::uint32_t i = 0; i < instanceCount; ++i) {
       instance.mesh = meshes[i % meshes.size()];
       vertexCount_ += engine_.vertexCount(instance.mesh);
-      instance.pose = palettes_.emplace_back(engine_.addPose(poses_[0], {.mayScale = false}));
+      instance.pose = palettes_.emplace_back(
+          engine_.addPose(poses_[0], {.promise = JointPromise::scaleIgnored}));
       if (i == 0) must(engine_.recorder().prepare(instance));
       must(engine_->addInstance(instance));
     }

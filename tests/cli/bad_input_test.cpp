@@ -523,8 +523,8 @@ TEST_F(BadInput, NanInAPoseAffectsThatInstanceAlone) {
     poses.push_back(randomPose(instance, 10, Rigidity::rigid));
   std::vector<samples::SkinRequest> requests;
   for (std::size_t instance = 0; instance < 6; ++instance) {
-    requests.push_back(
-        {&packed, poses[instance], true, instance < 3 ? Method::linear : Method::dualQuaternion});
+    requests.push_back({&packed, poses[instance], JointPromise::scaling,
+                        instance < 3 ? Method::linear : Method::dualQuaternion});
   }
   const auto before = samples::runBatch(device(), context(), requests);
   for (JointMatrix& joint : poses[1]) joint.m[0][0] = nan;

@@ -108,6 +108,7 @@ TEST(BenchTest, MeasuresMethodsFormatsAndInstancesBesidePlainKernels) {
   EXPECT_EQ(measured.json["vertices"], 10'000);
   EXPECT_GT(measured.json["start_up"]["seconds"].get<double>(), 0);
   EXPECT_GT(measured.json["start_up"]["seconds_without_scale"].get<double>(), 0);
+  EXPECT_GT(measured.json["start_up"]["seconds_rigid"].get<double>(), 0);
   EXPECT_NE(measured.result.output.find("to the first frame"), std::string::npos);
   EXPECT_GT(std::filesystem::file_size(picture), 10'000u);
 }

@@ -267,16 +267,16 @@ TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
   std::vector<std::vector<std::byte>> outputs;
   // With normals it is the fast path.
   for (const VertexLayout& layout : {VertexLayout(), normalsToo()}) {
-    for (const bool mayScale : {true, false}) {
+    for (const JointPromise promise : {JointPromise::scaling, JointPromise::scaleIgnored}) {
       InstanceDescription description;
       description.mesh = mesh_;
       description.layout = layout;
-      description.pose = must(engine_->addPose(jointCount, {.mayScale = mayScale}));
+      description.pose = must(engine_->addPose(jointCount, {.promise = promise}));
       engine_.writePose(description.pose, pose);
       instances_.push_back(must(engine_->addInstance(description)));
       cpu::Instance instance;
       instance.pose = pose;
-      instance.mayScale = mayScale;
+      instance.promise = promise;
       outputs.push_back(skinOne(packed_, description.method, description.layout, instance));
     }
   }

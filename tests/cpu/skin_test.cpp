@@ -579,13 +579,13 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
 TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
   const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
   const std::vector<std::uint32_t> vertices{200, 3, 4, 4, 150, 77, 0, 9, 101, 202};
-  for (const auto& [rigidity, mayScale] :
-       {std::pair(Rigidity::rigid, true), std::pair(Rigidity::shear, true),
-        std::pair(Rigidity::shear, false)}) {
+  for (const auto& [rigidity, promise] : {std::pair(Rigidity::rigid, JointPromise::scaling),
+                                          std::pair(Rigidity::shear, JointPromise::scaling),
+                                          std::pair(Rigidity::shear, JointPromise::scaleIgnored)}) {
     Crowd crowd(203, 5, rigidity, plainLayout);
     for (cpu::Instance& instance : crowd.instances) {
       instance.morphs = morphs;
-      instance.mayScale = mayScale;
+      instance.promise = promise;
     }
     for (const Method method : everydayMethods) {
       crowd.skin(method);

@@ -98,7 +98,7 @@ void putChecksumRight(std::vector<std::uint32_t>& words) {
 
 /// A job with all attributes that the mesh claims to have, and its first and last morph target.
 void planWith(const MeshInfo& info) {
-  const PoseDescription palette{info.requiredJoints, 0, true};
+  const PoseDescription palette{info.requiredJoints, 0, JointPromise::scaling};
   std::vector<MorphWeight> morphs;
   if (info.morphTargetCount > 1) morphs.push_back({info.morphTargetCount - 1, 0.5f});
   if (info.morphTargetCount > 0) morphs.push_back({0, -2});

@@ -167,7 +167,7 @@ class AccelerationStructureTest : public DeviceTest,
   void preparePose(Pose& pose, std::uint32_t seed) {
     pose.joints = randomPose(seed, jointCount, Rigidity::rigid);
     addExpectations(pose, mesh_);
-    const PoseDescription palette{jointCount, 0, false};
+    const PoseDescription palette{jointCount, 0, JointPromise::rigid};
     Job job;
     job.mesh = packed_->info();
     job.places[Stream::positions] = GetParam().attribute;

@@ -39,7 +39,7 @@ class InexactTest : public DeviceTest {
                                     std::span<const JointMatrix> pose, Method method) {
     const Result<PackedMesh> packed = pack(mesh.view(), static_cast<std::uint32_t>(pose.size()));
     if (!packed) return packed.error();
-    const samples::SkinRequest request{&*packed, pose, true, method};
+    const samples::SkinRequest request{&*packed, pose, JointPromise::scaling, method};
     samples::RunOptions options;
     options.output.tangents = VertexFormat::float32x4;
     options.countUntouched = false;

@@ -34,7 +34,7 @@ Comparison skinAndCompare(samples::Device& device, vulkan::Context& context, Own
                           std::span<const JointMatrix> pose, Method method) {
   Result<PackedMesh> packed = pack(mesh.view(), static_cast<std::uint32_t>(pose.size()));
   EXPECT_TRUE(packed.ok()) << (packed ? "" : packed.error().message);
-  const samples::SkinRequest request{&*packed, pose, true, method};
+  const samples::SkinRequest request{&*packed, pose, JointPromise::scaling, method};
   samples::RunOptions options;
   options.output.gap = 8;
   Result<samples::BatchResult> result = samples::runBatch(device, context, {&request, 1}, options);
@@ -114,7 +114,7 @@ class JointsTest : public DeviceTest {
   samples::BatchResult skin(OwnedMesh& mesh, std::span<const JointMatrix> pose, Method method) {
     const Result<PackedMesh> packed = pack(mesh.view(), static_cast<std::uint32_t>(pose.size()));
     EXPECT_TRUE(packed.ok());
-    const samples::SkinRequest request{&*packed, pose, true, method};
+    const samples::SkinRequest request{&*packed, pose, JointPromise::scaling, method};
     samples::RunOptions options;
     options.output.tangents = VertexFormat::float32x4;
     Result<samples::BatchResult> result =

@@ -24,8 +24,9 @@ void* allocate(std::size_t size) {
 
 }  // namespace
 
-/// LLVM, inside lavapipe, deletes by the operators below what it got from the sanitizer's.
-extern "C" const char* __asan_default_options();
+/// LLVM, inside lavapipe, deletes by the operators below what it got from the sanitizer's, whose
+/// library looks for this function in the program.
+extern "C" __attribute__((visibility("default"))) const char* __asan_default_options();
 extern "C" const char* __asan_default_options() {
   return "alloc_dealloc_mismatch=0";
 }

@@ -67,7 +67,8 @@ Crowd makeCrowd(std::uint32_t instances) {
         randomPose(100 + instance, 30, instance % 5 == 0 ? Rigidity::shear : Rigidity::rigid));
   }
   for (std::uint32_t instance = 0; instance < instances; ++instance) {
-    crowd.requests.push_back({&crowd.packedMeshes[instance % 3], crowd.poses[instance], true,
+    crowd.requests.push_back({&crowd.packedMeshes[instance % 3], crowd.poses[instance],
+                              JointPromise::scaling,
                               instance % 7 < 3 ? Method::linear : Method::dualQuaternion});
   }
   return crowd;
@@ -156,10 +157,12 @@ TEST_F(BatchTest, SingularJointsGiveFiniteVertices) {
     for (int column = 0; column < 3; ++column) pose[4].m[row][column] *= 1e15f;
   }
   for (const Method method : allMethods) {
-    const samples::SkinRequest request{&packedMesh, pose, true, method};
-    const samples::SkinnedVertices skinned = run({&request, 1}).instances[0];
-    EXPECT_TRUE(isFinite(skinned.positions));
-    EXPECT_TRUE(isFinite(skinned.normals));
+    for (const JointPromise promise : {JointPromise::scaling, JointPromise::rigid}) {
+      const samples::SkinRequest request{&packedMesh, pose, promise, method};
+      const samples::SkinnedVertices skinned = run({&request, 1}).instances[0];
+      EXPECT_TRUE(isFinite(skinned.positions));
+      EXPECT_TRUE(isFinite(skinned.normals));
+    }
   }
 }
 
@@ -168,10 +171,12 @@ TEST_F(BatchTest, TheStatusTellsWhatAPoseHolds) {
   const PackedMesh packedMesh = packed(mesh, 20);
   const std::vector<JointMatrix> rigid = randomPose(10, 20, Rigidity::rigid),
                                  shear = randomPose(10, 20, Rigidity::shear);
-  const std::vector<samples::SkinRequest> requests{{&packedMesh, rigid, true},
-                                                   {&packedMesh, shear, true},
-                                                   {&packedMesh, shear, false},
-                                                   {&packedMesh, rigid, false}};
+  const std::vector<samples::SkinRequest> requests{{&packedMesh, rigid, JointPromise::scaling},
+                                                   {&packedMesh, shear, JointPromise::scaling},
+                                                   {&packedMesh, shear, JointPromise::scaleIgnored},
+                                                   {&packedMesh, rigid, JointPromise::scaleIgnored},
+                                                   {&packedMesh, rigid, JointPromise::rigid},
+                                                   {&packedMesh, shear, JointPromise::rigid}};
   const samples::BatchResult result = run(requests);
   const auto expectStatus = [&](std::size_t index, std::uint32_t twoPhase, std::uint32_t nonRigid,
                                 std::uint32_t undeclared) {
@@ -185,8 +190,11 @@ TEST_F(BatchTest, TheStatusTellsWhatAPoseHolds) {
   expectStatus(1, 1, 20, 0);
   expectStatus(2, 0, 20, 20);
   expectStatus(3, 0, 0, 0);
-  // A rigid pose is skinned alike whether or not scale was declared.
+  expectStatus(4, 0, 0, 0);
+  expectStatus(5, 0, 20, 20);
+  // A rigid pose is skinned alike whatever was promised.
   expectSameBits(result.instances[0], result.instances[3]);
+  expectSameBits(result.instances[0], result.instances[4]);
 }
 
 TEST_F(BatchTest, AVertexWithoutWeightStaysInBindPose) {
@@ -195,7 +203,7 @@ TEST_F(BatchTest, AVertexWithoutWeightStaysInBindPose) {
   const PackedMesh packedMesh = packed(mesh, 4);
   const std::vector<JointMatrix> pose = randomPose(12, 4, Rigidity::shear);
   for (const Method method : allMethods) {
-    const samples::SkinRequest request{&packedMesh, pose, true, method};
+    const samples::SkinRequest request{&packedMesh, pose, JointPromise::scaling, method};
     EXPECT_EQ(run({&request, 1}).instances[0].positions, mesh.positions);
   }
 }
@@ -208,7 +216,7 @@ TEST_F(BatchTest, TheMostJointsAPoseMayHave) {
   EXPECT_EQ(packedMesh.info().requiredJoints, maxPoseJoints);
   const std::vector<JointMatrix> pose = randomPose(14, maxPoseJoints, Rigidity::rigid);
   for (const Method method : allMethods) {
-    const samples::SkinRequest request{&packedMesh, pose, false, method};
+    const samples::SkinRequest request{&packedMesh, pose, JointPromise::scaleIgnored, method};
     const samples::SkinnedVertices skinned = run({&request, 1}).instances[0];
     const reference::SkinnedMesh expected = *reference::skin(mesh.view(), pose, method);
     EXPECT_TRUE(compareWithReference(expected, skinned.view())->passed());

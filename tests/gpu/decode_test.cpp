@@ -316,7 +316,7 @@ TEST_F(DecodeTest, AVertexShaderDecodesWhatTheKernelsStore) {
   addTangents(mesh, 22);
   const PackedMesh packed = must(pack(mesh.view(), jointCount));
   const std::vector<JointMatrix> pose = randomPose(23, jointCount, Rigidity::rigid);
-  samples::SkinRequest request{&packed, pose, true, Method::dualQuaternion, {}};
+  samples::SkinRequest request{&packed, pose, JointPromise::scaling, Method::dualQuaternion, {}};
   request.box = {{-30, -20, -25}, {30, 40, 35}};
   samples::RunOptions options;
   options.output.positions = VertexFormat::snorm16x4;

@@ -56,7 +56,7 @@ TEST_P(FlatJointsTest, AreNotTakenForMirrors) {
   EXPECT_GT(above, 5u);
   const Result<PackedMesh> packed = pack(mesh.view(), jointCount);
   ASSERT_TRUE(packed.ok());
-  const samples::SkinRequest request{&*packed, pose, true, method};
+  const samples::SkinRequest request{&*packed, pose, JointPromise::scaling, method};
   const Result<samples::BatchResult> result = samples::runBatch(device(), context(), {&request, 1});
   ASSERT_TRUE(result.ok()) << result.error().message;
   const Result<reference::SkinnedMesh> expected = reference::skin(mesh.view(), pose, method);

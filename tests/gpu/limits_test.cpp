@@ -21,8 +21,8 @@ TEST_F(LimitsTest, OutputLargerThanAStorageBufferRangeIsSplit) {
   for (std::uint32_t i = 0; i < 50; ++i) poses.push_back(randomPose(i, 20, Rigidity::rigid));
   std::vector<samples::SkinRequest> requests;
   for (std::uint32_t i = 0; i < 50; ++i) {
-    requests.push_back(
-        {&packed[i % 2], poses[i], false, i % 3 == 0 ? Method::linear : Method::dualQuaternion});
+    requests.push_back({&packed[i % 2], poses[i], JointPromise::scaleIgnored,
+                        i % 3 == 0 ? Method::linear : Method::dualQuaternion});
   }
   samples::RunOptions options;
   options.output.gap = 4;
@@ -57,7 +57,8 @@ TEST_F(LimitsTest, MoreWorkgroupsThanADimensionHasAreFolded) {
   std::vector<std::vector<JointMatrix>> poses;
   for (std::uint32_t i = 0; i < 30; ++i) poses.push_back(randomPose(i, 10, Rigidity::rigid));
   std::vector<samples::SkinRequest> requests;
-  for (const std::vector<JointMatrix>& pose : poses) requests.push_back({&packed, pose, false});
+  for (const std::vector<JointMatrix>& pose : poses)
+    requests.push_back({&packed, pose, JointPromise::scaleIgnored});
   const Result<samples::BatchResult> flat = samples::runBatch(device(), context(), requests);
   ASSERT_TRUE(flat.ok());
 

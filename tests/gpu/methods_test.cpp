@@ -45,7 +45,7 @@ class SomeMethodsTest : public DeviceTest {
   }
   samples::SkinnedVertices skin(OwnedMesh& mesh, std::span<const JointMatrix> pose, Method method) {
     const PackedMesh packedMesh = *pack(mesh.view(), static_cast<std::uint32_t>(pose.size()));
-    const samples::SkinRequest request{&packedMesh, pose, true, method};
+    const samples::SkinRequest request{&packedMesh, pose, JointPromise::scaling, method};
     samples::BatchResult result = run({&request, 1});
     return result.instances.empty() ? samples::SkinnedVertices{} : std::move(result.instances[0]);
   }
@@ -93,7 +93,7 @@ Crowd crowdOf(Method method) {
   }
   for (std::uint32_t instance = 0; instance < 12; ++instance) {
     crowd.requests.push_back(
-        {&crowd.packedMeshes[instance % 3], crowd.poses[instance], true, method});
+        {&crowd.packedMeshes[instance % 3], crowd.poses[instance], JointPromise::scaling, method});
   }
   return crowd;
 }
@@ -129,7 +129,8 @@ TEST_P(MethodTest, Truth20_ThePlaceInTheBatchChangesNoBit) {
   const samples::BatchResult together = run(crowd.requests);
   std::vector<samples::SkinRequest> backwards(crowd.requests.rbegin(), crowd.requests.rend());
   for (const Method method : allMethods) {
-    backwards.insert(backwards.begin() + 3, {&crowd.packedMeshes[1], crowd.poses[2], true, method});
+    backwards.insert(backwards.begin() + 3,
+                     {&crowd.packedMeshes[1], crowd.poses[2], JointPromise::scaling, method});
   }
   const samples::BatchResult among = run(backwards);
   for (std::size_t i = 0; i < crowd.requests.size(); ++i) {
@@ -152,8 +153,9 @@ TEST_P(MethodTest, Truth20_TheVariantForFewerInfluencesChangesNoBit) {
     const PackedMesh packedFew = *pack(few.view(), 10);
     for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear}) {
       const std::vector<JointMatrix> pose = randomPose(3, 10, rigidity);
-      const std::vector<samples::SkinRequest> requests{{&packedFew, pose, true, GetParam()},
-                                                       {&packedNine, pose, true, GetParam()}};
+      const std::vector<samples::SkinRequest> requests{
+          {&packedFew, pose, JointPromise::scaling, GetParam()},
+          {&packedNine, pose, JointPromise::scaling, GetParam()}};
       expectSameBytes(run(requests).instances[0], run({&requests[0], 1}).instances[0],
                       std::to_string(influences));
     }
@@ -161,13 +163,15 @@ TEST_P(MethodTest, Truth20_TheVariantForFewerInfluencesChangesNoBit) {
 }
 
 // A rigid pose whose palette may scale is skinned by the two-phase kernel, with S left out.
-TEST_P(MethodTest, Truth20_DeclaringScaleChangesNoBitOfARigidPose) {
+TEST_P(MethodTest, Truth20_NoPromiseChangesABitOfARigidPose) {
   OwnedMesh mesh = randomMesh(4, 300, 10, 4);
   const PackedMesh packedMesh = *pack(mesh.view(), 10);
   const std::vector<JointMatrix> pose = randomPose(5, 10, Rigidity::rigid);
-  const samples::SkinRequest may{&packedMesh, pose, true, GetParam()},
-      mayNot{&packedMesh, pose, false, GetParam()};
+  const samples::SkinRequest may{&packedMesh, pose, JointPromise::scaling, GetParam()},
+      mayNot{&packedMesh, pose, JointPromise::scaleIgnored, GetParam()},
+      rigid{&packedMesh, pose, JointPromise::rigid, GetParam()};
   expectSameBytes(run({&may, 1}).instances[0], run({&mayNot, 1}).instances[0], "rigid");
+  expectSameBytes(run({&may, 1}).instances[0], run({&rigid, 1}).instances[0], "promised rigid");
 }
 
 // ---- 14: an influence of weight 0 is none
@@ -413,7 +417,7 @@ TEST_P(MethodTest, SharesMayBeTheMeshsOwn) {
     MeshView view = mesh.view();
     view.dualQuaternionWeight = view.bulgeStrength = share;
     const PackedMesh packedMesh = *pack(view, 20);
-    const samples::SkinRequest request{&packedMesh, pose, true, GetParam()};
+    const samples::SkinRequest request{&packedMesh, pose, JointPromise::scaling, GetParam()};
     samples::BatchResult result = run({&request, 1});
     const Result<reference::SkinnedMesh> expected = reference::skin(view, pose, GetParam());
     EXPECT_TRUE(compareWithReference(*expected, result.instances[0].view())->passed()) << share;
@@ -431,7 +435,7 @@ TEST_P(MethodTest, APoseInTwoFormsIsTheSamePose) {
   for (const samples::SkinRequest& request : crowd.requests) {
     requests.push_back(request);
     requests.push_back(
-        {request.mesh, request.pose, true,
+        {request.mesh, request.pose, JointPromise::scaling,
          GetParam() == Method::logMatrix ? Method::dualQuaternion : Method::logMatrix});
   }
   const samples::BatchResult alone = run(crowd.requests), both = run(requests);

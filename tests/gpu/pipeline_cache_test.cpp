@@ -84,7 +84,8 @@ class PipelineCacheTest : public DeviceTest {
     OwnedMesh mesh = randomMesh(1, 100, 4, 4);
     const PackedMesh packed = must(pack(mesh.view(), 4));
     const std::vector<JointMatrix> pose = randomPose(2, 4, Rigidity::rigid);
-    const samples::SkinRequest request{&packed, pose, true, Method::dualQuaternion};
+    const samples::SkinRequest request{&packed, pose, JointPromise::scaling,
+                                       Method::dualQuaternion};
     return must(samples::runBatch(device(), context, {&request, 1})).instances[0].streams[0];
   }
 

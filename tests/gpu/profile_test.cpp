@@ -62,7 +62,7 @@ TEST_F(ProfileTest, DefaultsChangeNoBit) {
   for (const Method method : {Method::linear, Method::dualQuaternion}) {
     std::vector<samples::SkinRequest> requests;
     for (const std::vector<JointMatrix>& pose : poses)
-      requests.push_back({&packed, pose, false, method});
+      requests.push_back({&packed, pose, JointPromise::scaleIgnored, method});
     samples::RunOptions options;
     options.tuning = context().tuning();
     const Result<samples::BatchResult> defaults =

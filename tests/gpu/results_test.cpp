@@ -64,8 +64,8 @@ TEST_F(ResultsTest, BoxesAreExactForEveryInstanceOfABatch) {
   for (std::uint32_t i = 0; i < 30; ++i) poses.push_back(randomPose(i, 10, Rigidity::rigid, 3));
   std::vector<samples::SkinRequest> requests;
   for (std::uint32_t i = 0; i < 30; ++i)
-    requests.push_back(
-        {&packed, poses[i], true, i % 2 == 0 ? Method::linear : Method::dualQuaternion});
+    requests.push_back({&packed, poses[i], JointPromise::scaling,
+                        i % 2 == 0 ? Method::linear : Method::dualQuaternion});
   const samples::BatchResult result = run(context(), requests, withBounds());
   for (const samples::SkinnedVertices& instance : result.instances)
     expectSameBox(instance.result.box(), boxOf(instance.positions));
@@ -94,7 +94,7 @@ TEST_F(ResultsTest, VerticesThatAreNotFiniteAreLeftOutOfTheBox) {
   OwnedMesh mesh = randomMesh(3, 300, 2, 1);
   const PackedMesh packed = *pack(mesh.view(), 2);
   std::vector<JointMatrix> pose = randomPose(4, 2, Rigidity::rigid);
-  const samples::SkinRequest request{&packed, pose, true, Method::linear};
+  const samples::SkinRequest request{&packed, pose, JointPromise::scaling, Method::linear};
   pose[1].m[0][0] = std::numeric_limits<float>::quiet_NaN();
   samples::BatchResult result = run(context(), {&request, 1}, withBounds());
   std::vector<float> finite;
@@ -109,7 +109,7 @@ TEST_F(ResultsTest, VerticesThatAreNotFiniteAreLeftOutOfTheBox) {
   }
   for (float& weight : mesh.weights) weight = 1;
   const PackedMesh weighted = *pack(mesh.view(), 2);
-  const samples::SkinRequest none{&weighted, pose, true, Method::linear};
+  const samples::SkinRequest none{&weighted, pose, JointPromise::scaling, Method::linear};
   result = run(context(), {&none, 1}, withBounds());
   EXPECT_FALSE(result.instances[0].result.box().has_value());
 }
@@ -124,13 +124,14 @@ TEST_F(ResultsTest, ConservativeBoxesHoldTheExactOnes) {
     ASSERT_TRUE(joints.ok()) << joints.error().message;
     for (std::uint32_t seed = 0; seed < 10; ++seed) {
       const std::vector<JointMatrix> pose = randomPose(seed, 12, rigidity);
-      const bool mayScale = seed % 2 == 0;
+      const JointPromise promise =
+          seed % 2 == 0 ? JointPromise::scaling : JointPromise::scaleIgnored;
       for (const Method method : allMethods) {
-        const samples::SkinRequest request{&packed, pose, mayScale, method};
+        const samples::SkinRequest request{&packed, pose, promise, method};
         const samples::BatchResult result = run(context(), {&request, 1}, withBounds());
         const std::optional<Box> exact = result.instances[0].result.box();
         ASSERT_TRUE(exact.has_value());
-        const Box box = skinnedBounds(*joints, pose, method, mayScale);
+        const Box box = skinnedBounds(*joints, pose, method, promise);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           EXPECT_LE(box.min[axis], exact->min[axis]);
           EXPECT_GE(box.max[axis], exact->max[axis]);
@@ -163,7 +164,7 @@ TEST_F(ResultsTest, ConservativeBoxesClampNothing) {
   samples::RunOptions options;
   options.output.positions = VertexFormat::snorm16x4;
   for (const Method method : {Method::linear, Method::dualQuaternion, Method::blended}) {
-    samples::SkinRequest request{&packed, pose, true, method};
+    samples::SkinRequest request{&packed, pose, JointPromise::scaling, method};
     request.box = skinnedBounds(joints, pose, method);
     // Of some methods nothing is proven: there the engine has a box of its own.
     if (!std::isfinite(request.box.min[0])) request.box = referenceBox(mesh, pose, method);

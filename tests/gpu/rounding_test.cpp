@@ -43,7 +43,7 @@ class RoundingTest : public DeviceTest {
     const Result<PackedMesh> packed = pack(mesh.view(), 1);
     EXPECT_TRUE(packed.ok());
     const std::vector<JointMatrix> pose(1);
-    samples::SkinRequest request{&*packed, pose, true, Method::linear};
+    samples::SkinRequest request{&*packed, pose, JointPromise::scaling, Method::linear};
     request.box = box;
     samples::RunOptions options;
     options.output.positions = format;

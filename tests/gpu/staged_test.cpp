@@ -33,7 +33,8 @@ struct StagedCrowd {
     for (std::uint32_t i = 0; i < 30; ++i)
       poses.push_back(randomPose(i, 20, i % 4 == 0 ? Rigidity::shear : Rigidity::rigid));
     for (std::uint32_t i = 0; i < poses.size(); ++i) {
-      requests.push_back({&packed[i % 3], poses[i], i % 2 == 0, method});
+      requests.push_back({&packed[i % 3], poses[i],
+                          i % 2 == 0 ? JointPromise::scaling : JointPromise::scaleIgnored, method});
       if (i % 5 == 0) requests.back().morphs = morphs;
     }
   }

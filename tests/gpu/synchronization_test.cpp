@@ -31,7 +31,8 @@ TEST_F(SynchronizationTest, AMissingBarrierBetweenThePassesIsReported) {
   OwnedMesh mesh = randomMesh(1, 100, 5, 4);
   const PackedMesh packedMesh = *pack(mesh.view(), 5);
   const std::vector<JointMatrix> pose = randomPose(2, 5, Rigidity::rigid);
-  const samples::SkinRequest request{&packedMesh, pose, true, Method::dualQuaternion};
+  const samples::SkinRequest request{&packedMesh, pose, JointPromise::scaling,
+                                     Method::dualQuaternion};
 
   ASSERT_TRUE(samples::runBatch(device(), context(), {&request, 1}).ok());
   EXPECT_TRUE(device().takeValidationMessages().empty()) << "with the barrier the layer is silent";

@@ -225,15 +225,17 @@ TEST_F(SystemOutputTest, ScaleThatWasNotDeclaredIsLeftOut) {
   SystemEngine engine(device(), context(), description());
   engine.begin();
   const PackedMesh packed = systemMesh(1, 100);
-  const Pose pose = randomPose(1, 8, Rigidity::shear);
   InstanceDescription instance;
   instance.layout = plainLayout();
   instance.mesh = engine.addMesh(packed);
-  for (const bool mayScale : {true, false}) {
-    instance.pose = engine.addPose(pose, {.mayScale = mayScale});
+  for (const JointPromise promise :
+       {JointPromise::scaling, JointPromise::scaleIgnored, JointPromise::rigid}) {
+    const Pose pose =
+        randomPose(1, 8, promise == JointPromise::rigid ? Rigidity::rigid : Rigidity::shear);
+    instance.pose = engine.addPose(pose, {.promise = promise});
     const InstanceHandle handle = engine.addInstance(instance);
     engine.submit();
-    expectSkinned(engine.read(handle), alone(packed, pose, instance, {}, mayScale));
+    expectSkinned(engine.read(handle), alone(packed, pose, instance, {}, promise));
     engine.begin();
   }
   engine.submit();

@@ -31,7 +31,8 @@ Pose rotationsOf(std::span<const JointMatrix> pose) {
 void expectReference(const samples::SkinnedVertices& skinned, const samples::SkinRequest& request) {
   OwnedMesh* const source = sourceOf(*request.mesh);
   ASSERT_NE(source, nullptr) << "not a mesh of systemMesh";
-  const bool isTurnedOnly = !request.mayScale && request.method != Method::linear;
+  const bool isTurnedOnly =
+      request.promise != JointPromise::scaling && request.method != Method::linear;
   const Pose rotations = isTurnedOnly ? rotationsOf(request.pose) : Pose();
   const std::span<const JointMatrix> pose = isTurnedOnly ? rotations : request.pose;
   const reference::SkinnedMesh expected =
@@ -62,8 +63,8 @@ vulkan::SceneRecorderDescription SystemTest::description() {
 
 Streams SystemTest::alone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                           const InstanceDescription& description,
-                          std::span<const MorphWeight> morphs, bool mayScale) {
-  samples::SkinRequest request{&mesh, pose, mayScale, description.method, morphs};
+                          std::span<const MorphWeight> morphs, JointPromise promise) {
+  samples::SkinRequest request{&mesh, pose, promise, description.method, morphs};
   request.box = description.box;
   samples::RunOptions options;
   options.output.positions = description.layout.positions;

@@ -31,7 +31,7 @@ class SystemTest : public DeviceTest {
   /// reference. Previous positions are the current ones.
   Streams alone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                 const InstanceDescription& description, std::span<const MorphWeight> morphs = {},
-                bool mayScale = true);
+                JointPromise promise = JointPromise::scaling);
 
   /// Expects the positions, normals and tangents of an instance to be those of the job alone.
   static void expectSkinned(const Streams& skinned, const Streams& expected);

@@ -151,7 +151,7 @@ TEST_F(TexelTest, StoresOfAnyWidthGiveTheSameBits) {
   };
   Rigs rigs(Method::dualQuaternion, {4});
   for (samples::SkinRequest& request : rigs.requests) {
-    request.mayScale = false;
+    request.promise = JointPromise::scaleIgnored;
     request.morphs = {};
   }
   VkPhysicalDeviceFeatures2 integers{};
@@ -188,7 +188,7 @@ TEST_F(TexelTest, EvenlySpacedInstancesGetTheSameBits) {
     Rigs even(method, {4});
     for (const bool scales : {true, false}) {
       for (samples::SkinRequest& request : even.requests) {
-        request.mayScale = scales;
+        request.promise = scales ? JointPromise::scaling : JointPromise::scaleIgnored;
         request.morphs = {};
       }
       // The second has extensions, and previous poses.
@@ -215,13 +215,13 @@ TEST_F(TexelTest, EvenlySpacedInstancesGetTheSameBits) {
   }
 }
 
-// Where no joint scales, `mayScale` changes nothing: directions are scaled by powers of two.
+// Where no joint scales, the promise changes nothing: directions are scaled by powers of two.
 TEST_F(TexelTest, LinearDirectionsHaveTheSameBitsWhetherJointsMayScaleOrNot) {
   Rigs rigs(Method::linear, {1, 4, 7});
   samples::OutputLayout layout;
   layout.tangents = VertexFormat::float32x4;
   const Result<samples::BatchResult> may = runOn(*texels_, rigs.requests, layout);
-  for (samples::SkinRequest& request : rigs.requests) request.mayScale = false;
+  for (samples::SkinRequest& request : rigs.requests) request.promise = JointPromise::scaleIgnored;
   const Result<samples::BatchResult> mayNot = runOn(*texels_, rigs.requests, layout);
   ASSERT_TRUE(may.ok() && mayNot.ok());
   expectSame(*may, *mayNot);

@@ -130,7 +130,7 @@ class ThreadsTest : public DeviceTest {
   /// All but the bindings.
   void prepareWork(Work& work, const PackedMesh& mesh, std::uint32_t seed) {
     const std::vector<JointMatrix> pose = randomPose(seed, 10, Rigidity::rigid);
-    const PoseDescription palette{10, 0, false};
+    const PoseDescription palette{10, 0, JointPromise::rigid};
     Job job;
     job.mesh = mesh.info();
     job.places[Stream::positions] = {0, 24, VertexFormat::float32x3};

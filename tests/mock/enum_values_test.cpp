@@ -54,6 +54,7 @@ struct Choice {
   /// Strides that are large enough for every format.
   VertexLayout layout{VertexFormat::float32x4, VertexFormat::float32x4, VertexFormat::float32x4,
                       true, true};
+  JointPromise promise = JointPromise::scaling;
 };
 
 class EnumValuesTest : public MockContextTest {
@@ -79,7 +80,10 @@ class EnumValuesTest : public MockContextTest {
     return instance;
   }
   PipelineNeeds needs(const Choice& choice) const {
-    return {.method = choice.method, .layout = choice.layout, .mesh = packed_.info()};
+    return {.method = choice.method,
+            .layout = choice.layout,
+            .mesh = packed_.info(),
+            .promise = choice.promise};
   }
   static VertexPlaces places(const Choice& choice) {
     VertexPlaces places = must(placeVertices(Choice().layout, vertexCount));
@@ -97,8 +101,8 @@ class EnumValuesTest : public MockContextTest {
     job.box = box_;
     return job;
   }
-  Result<void> plan(const Job& job) const {
-    const PoseDescription pose{jointCount};
+  Result<void> plan(const Job& job, JointPromise promise) const {
+    const PoseDescription pose{jointCount, 0, promise};
     Plan plan;
     return makePlan({{&pose, 1},
                      {&job, 1},
@@ -110,6 +114,7 @@ class EnumValuesTest : public MockContextTest {
   Result<void> skin(const Choice& choice) {
     cpu::Instance instance;
     instance.pose = pose_;
+    instance.promise = choice.promise;
     instance.output.fill(output_.data());
     instance.box = box_;
     cpu::Job job;
@@ -122,6 +127,10 @@ class EnumValuesTest : public MockContextTest {
   static Result<void> add(Scene& scene, const InstanceDescription& instance) {
     const Result<InstanceHandle> added = scene.addInstance(instance);
     return added ? scene.removeInstance(*added) : added.error();
+  }
+  Result<void> addPose(const Choice& choice) {
+    const Result<PoseHandle> added = scene_->addPose(jointCount, {.promise = choice.promise});
+    return added ? scene_->removePose(*added) : added.error();
   }
   Result<void> change(const Choice& choice) {
     const InstanceHandle handle = must(scene_->addInstance(instance_));
@@ -148,6 +157,8 @@ class EnumValuesTest : public MockContextTest {
     attributes.insert("method");
     std::set<std::string> all = layout;
     all.insert("method");
+    std::set<std::string> withPromise = all;
+    withPromise.insert("promise");
     const auto isForComparison = [](const Choice& choice) {
       return dermis::isForComparison(choice.method);
     };
@@ -169,13 +180,15 @@ class EnumValuesTest : public MockContextTest {
          [this](const Choice& choice) {
            return verdict(pipelines(needs(choice), richLimits(), {}));
          },
-         all},
+         withPromise},
         {"pipelines of a job",
          [this](const Choice& choice) { return verdict(pipelines(job(choice), richLimits(), {})); },
          attributes},
         {"Context::prepare of needs",
-         [this](const Choice& choice) { return context->prepare(needs(choice)); }, all},
-        {"makePlan", [this](const Choice& choice) { return plan(job(choice)); }, attributes},
+         [this](const Choice& choice) { return context->prepare(needs(choice)); }, withPromise},
+        {"makePlan", [this](const Choice& choice) { return plan(job(choice), choice.promise); },
+         withPromise},
+        {"Scene::addPose", [this](const Choice& choice) { return addPose(choice); }, {"promise"}},
         {"Scene::pipelineNeeds",
          [this](const Choice& choice) {
            return verdict(scene_->pipelineNeeds(chosen(instance_, choice)));
@@ -187,15 +200,16 @@ class EnumValuesTest : public MockContextTest {
         {"cpu::SceneRunner::addInstance",
          [this](const Choice& choice) { return add(runner_->scene(), chosen(ofRunner_, choice)); },
          all, isForComparison},
-        {"cpu::skin", [this](const Choice& choice) { return skin(choice); }, attributes,
+        {"cpu::skin", [this](const Choice& choice) { return skin(choice); }, withPromise,
          isForComparison},
         {"cpu::skinVertices",
          [this](const Choice& choice) {
            cpu::Instance instance;
            instance.pose = pose_;
+           instance.promise = choice.promise;
            return cpu::skinVertices(mesh_, choice.method, instance, {}, {});
          },
-         {"method"},
+         {"method", "promise"},
          isForComparison},
         {"reference::skin",
          [this](const Choice& choice) {
@@ -259,7 +273,7 @@ class EnumValuesTest : public MockContextTest {
   InstanceDescription instance_, ofRunner_;
 };
 
-TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
+TEST_F(EnumValuesTest, MethodsPromisesFormatsAndLayoutsAreChecked) {
   const auto isFormat = [](bool (*allows)(VertexFormat), bool mayBeNone) {
     return [=](std::uint32_t value) {
       return allows(number<VertexFormat>(value)) || (mayBeNone && value == 0);
@@ -268,6 +282,10 @@ TEST_F(EnumValuesTest, MethodsFormatsAndLayoutsAreChecked) {
   expectChecked(
       "method", [](Choice& choice, std::uint32_t value) { choice.method = number<Method>(value); },
       [](std::uint32_t value) { return value < allMethods.size(); });
+  expectChecked(
+      "promise",
+      [](Choice& choice, std::uint32_t value) { choice.promise = number<JointPromise>(value); },
+      [](std::uint32_t value) { return value < 3; });
   expectChecked(
       "positions",
       [](Choice& choice, std::uint32_t value) {
@@ -311,6 +329,7 @@ TEST_F(EnumValuesTest, NoVariantPoisonsThePipelinesOfAnother) {
   expectOnly(&Variant::method, {0, 1, 2, 3, 4, 5, 6, 7, 8}, 16, "method");
   expectOnly(&Variant::positions, {1, 2, 3, 4, 5, 6}, 16, "positions");
   expectOnly(&Variant::motion, {0, 1}, 2, "motion");
+  expectOnly(&Variant::rigid, {0}, 2, "rigid");  // which palette kernels alone have
   expectOnly(&Variant::recordBytes, {0, 8, 12, 16, 24, 32}, 64, "recordBytes");
   expectOnly(&Variant::influences, {0, 1, 2, 4}, 8, "influences");
   expectOnly(&Variant::workgroupSize, {8, 16, 32, 64, 128}, 256, "workgroupSize");
@@ -451,7 +470,7 @@ TEST_F(EnumValuesTest, NoEnumIsMissing) {
   const std::set<std::string> known{
       "Method", "VertexFormat", "PipelineId", "BufferRole", "ComponentType", "MeshProblem",
       "ErrorCode", "Use", "QueueTransfer", "ShaderStage", "Interpolation", "ChannelPath",
-      "MissingNormals",
+      "MissingNormals", "JointPromise",
       // No function reads one: an index of arrays, bit masks, and what functions return.
       "Stream", "DeviceFeature", "BufferUse", "AlphaMode", "Wrap"};
   std::set<std::string> found;

@@ -38,7 +38,7 @@ struct MockBatch {
   /// A mesh with everything and a palette.
   MockBatch() {
     batch.addMesh(meshOf(100, 4, 4, MeshParts{true, true, 2}));
-    batch.addPose(4, true);
+    batch.addPose(4, JointPromise::scaling);
   }
   /// Positions and normals of one instance for each method, in one buffer.
   static MockBatch withAllMethods(const DeviceLimits& limits) {

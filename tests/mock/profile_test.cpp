@@ -103,7 +103,7 @@ TEST_P(MockProfileTest, DispatchesOfMillionsOfWorkgroupsKeepItsLimits) {
   OwnedBatch batch;
   // Nobody reads the mesh: a plan takes no more than these numbers.
   batch.addMesh(meshOf(100, 4, 4, MeshParts{true, false, 0}));
-  batch.addPose(4, false);
+  batch.addPose(4, JointPromise::scaleIgnored);
   for (int number = 0; number < 400; ++number) batch.addJob(0, 0, Method::dualQuaternion, true);
   constexpr std::uint32_t vertices = 1u << 21;
   std::uint64_t size = 0;

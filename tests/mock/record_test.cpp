@@ -371,7 +371,7 @@ TEST_F(RecordTest, TheSentenceOfAMissingPipelineTellsOfMorphTargetsAndAnyNumber)
   ASSERT_NO_FATAL_FAILURE(create());
   MockBatch batch;
   batch.batch.addMesh(meshOf(10, 5, 5, MeshParts{false, false, 1}));
-  batch.batch.addPose(5, false);
+  batch.batch.addPose(5, JointPromise::scaleIgnored);
   batch.batch.addJob(1, 1, Method::linear, false).morphs = batch.batch.keep({{0, 1.0f}});
   batch.makePlan(context->limits());
   const Result<vulkan::Bindings> bindings = context->createBindings(batch.buffers());
@@ -403,7 +403,7 @@ struct KnownLayouts {
     owned = OwnedBatch();
     for (int mesh = 0; mesh < 4; ++mesh) {
       owned.addMesh(meshOf(1 + below(200), 1 + below(9), 5, MeshParts{true, true, 3}));
-      owned.addPose(5 + below(4), below(2) == 0);
+      owned.addPose(5 + below(4), static_cast<JointPromise>(below(3)));
     }
     for (std::uint32_t count = below(30); count > 0; --count) {
       const Job& layout = layouts[below(static_cast<std::uint32_t>(layouts.size()))];

@@ -77,7 +77,7 @@ class Verifier {
   }
 
   Comparison verify(std::span<const JointMatrix> pose, Method method, const std::string& where) {
-    const samples::SkinRequest request{&packed_, pose, true, method};
+    const samples::SkinRequest request{&packed_, pose, JointPromise::scaling, method};
     const Result<samples::BatchResult> result = runner_->run({&request, 1});
     EXPECT_TRUE(result.ok()) << (result ? "" : result.error().message);
     if (!result) return {};

@@ -295,7 +295,7 @@ void expectInsideWithoutScale(OwnedMesh& mesh, std::span<const JointMatrix> scal
                               std::span<const JointMatrix> rotated, const std::string& what) {
   const JointBounds bounds = boundsOf(mesh.view(), static_cast<std::uint32_t>(scaled.size()));
   for (const Method method : provenMethods) {
-    const Box box = skinnedBounds(bounds, scaled, method, false);
+    const Box box = skinnedBounds(bounds, scaled, method, JointPromise::scaleIgnored);
     const bool scales = method == Method::linear;
     const Result<reference::SkinnedMesh> skinned =
         reference::skin(mesh.view(), scales ? scaled : rotated, method);

@@ -22,7 +22,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInFourteenDispatches) {
   batch.addMesh(meshOf(777, 4, 4, true));
   batch.addMesh(meshOf(64, 6, 4, true));
   for (std::uint32_t instance = 0; instance < 1000; ++instance) {
-    batch.addPose(4, instance % 5 == 0);
+    batch.addPose(4, instance % 5 == 0 ? JointPromise::scaling : JointPromise::scaleIgnored);
   }
   for (std::uint32_t instance = 0; instance < 1000; ++instance) {
     batch.addJob(instance % 3, instance,
@@ -38,7 +38,7 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInFourteenDispatches) {
   EXPECT_LE(out.buffer(BufferRole::tables).size / 4, 500 * 4 + 1000 * 8 + 3 * (4 + 4) * 12u);
 }
 
-// However many instances and meshes there are: the palettes, then a dispatch for each form of the
+// However many instances and meshes there are: the palettes of each promise, then a dispatch for each form of the
 // kernel.
 TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
   OwnedBatch batch = batchOfFiveMeshes();
@@ -52,7 +52,7 @@ TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
   const Plan out = planned(batch);
   EXPECT_EQ(dispatchesOf(out)[0].variant.kernel, Kernel::palette);
   // One, two, four, exactly four and eight influences; four with joints that scale.
-  EXPECT_EQ(dispatchesOf(out).size(), 2u + 6u);
+  EXPECT_EQ(dispatchesOf(out).size(), 3u + 6u);
 }
 
 TEST(Plan, LinearBlendingNeedsNoPaletteDispatch) {
@@ -78,14 +78,14 @@ TEST(Plan, PosesThatNoDualQuaternionJobUsesAreLeftOut) {
   EXPECT_EQ(out.statusOffset(4), std::nullopt);  // there is none
   EXPECT_NE(out.statusOffset(1), std::nullopt);
   EXPECT_NE(out.statusOffset(3), out.statusOffset(1));
-  // 9 joints that may scale, 7 joints that may: 64 bytes each, and a status of 16.
-  EXPECT_EQ(out.buffer(BufferRole::palettes).size, 16 + 9 * 64 + 16 + 7 * 64u);
+  // 9 joints that may scale take 64 bytes each, 7 that may not 32, and each status 16.
+  EXPECT_EQ(out.buffer(BufferRole::palettes).size, 16 + 9 * 64 + 16 + 7 * 32u);
 }
 
 // Dual quaternions serve all methods but one, which wants logarithms.
 TEST(Plan, APoseIsConvertedOnceForEachFormThatIsRead) {
   OwnedBatch batch(meshOf(10, 2, 5, true), 5);
-  batch.addPose(7, true);
+  batch.addPose(7, JointPromise::scaling);
   const auto sizeOf = [&](std::initializer_list<Method> methods, std::uint32_t palette) {
     batch.jobs.clear();
     batch.outputSize = 0;
@@ -111,7 +111,8 @@ TEST(Plan, APoseIsConvertedOnceForEachFormThatIsRead) {
 TEST(Plan, APoseInTwoFormsHasAStatusInEither) {
   OwnedBatch batch;
   batch.addMesh(meshOf(10, 2, 5, true));
-  for (int palette = 0; palette < 4; ++palette) batch.addPose(5, palette % 2 == 0);
+  for (int palette = 0; palette < 4; ++palette)
+    batch.addPose(5, palette % 2 == 0 ? JointPromise::scaling : JointPromise::rigid);
   batch.addJob(0, 0, Method::logMatrix, true);
   batch.addJob(0, 1, Method::logMatrix, true);
   batch.addJob(0, 1, Method::blended, true);
@@ -142,7 +143,7 @@ TEST(Plan, TheInfluencesOfAKernelAreThoseOfTheMesh) {
     OwnedBatch batch;
     batch.addMesh(meshOf(10, 1, 8, false));
     batch.addMesh(meshOf(10, influences, 8, false));
-    batch.addPose(8, false);
+    batch.addPose(8, JointPromise::scaleIgnored);
     batch.addJob(0, 0, Method::linear, false);
     batch.addJob(1, 0, Method::linear, false);
     batch.addJob(0, 0, Method::linear, false);
@@ -174,8 +175,8 @@ TEST(Plan, AnEmptyBatchIsAnEmptyPlan) {
 struct PlanFeatures : public ::testing::Test {
   PlanFeatures() {
     batch.addMesh(meshOf(100, 2, 4, MeshParts{true, true, 4}));
-    batch.addPose(4, false);
-    batch.addPose(4, false);
+    batch.addPose(4, JointPromise::scaleIgnored);
+    batch.addPose(4, JointPromise::scaleIgnored);
   }
   Job& add(Job job) { return batch.place(job, Arrangement::separate); }
   Job linear() const { return batch.jobOf(0, 0, Method::linear); }

@@ -25,7 +25,7 @@ struct PlanErrors : public ::testing::Test {
   PlanErrors() {
     batch.addMesh(meshOf(10, 2, 7, MeshParts{true, true, 5}));
     batch.addMesh(meshOf(10, 2, 7, false));
-    for (int palette = 0; palette < 3; ++palette) batch.addPose(8, true);
+    for (int palette = 0; palette < 3; ++palette) batch.addPose(8, JointPromise::scaling);
     for (std::uint32_t job = 0; job < 3; ++job) {
       batch.addJob(0, job, Method::dualQuaternion, true);
     }
@@ -138,7 +138,7 @@ TEST_F(PlanErrors, PosesThatAreTooShortForTheMesh) {
 }
 
 TEST_F(PlanErrors, PoseCounts) {
-  batch.addPose(0, false);
+  batch.addPose(0, JointPromise::scaleIgnored);
   batch.posesSize += 65537 * 48;  // room enough
   expectInvalid({"pose 3", "0 joints", "65536"});
   batch.poses[3].jointCount = 65537;
@@ -646,11 +646,11 @@ TEST_F(PlanErrors, BuffersLargerThanARange) {
 
 TEST_F(PlanErrors, PosesLargerThanARange) {
   // 48 bytes a matrix become 64 where a joint may scale.
-  batch.addPose(1000, true);
+  batch.addPose(1000, JointPromise::scaling);
   batch.jobs[2].pose = 3;
   limits.maxStorageBufferRange = 63000;
   expectRefused(ErrorCode::limitExceeded, {"range"});
-  batch.poses[3].mayScale = false;
+  batch.poses[3].promise = JointPromise::scaleIgnored;
   expectGood();
 }
 

@@ -153,7 +153,9 @@ class Simulation {
     const abi::PalettePush push = dispatch.palettePush();
     const bool logarithms = wantsLogarithms(dispatch.variant.method);
     ASSERT_TRUE(logarithms || dispatch.variant.method == Method::dualQuaternion);
-    ASSERT_TRUE(paletteDispatches_.insert({logarithms, dispatch.variant.scales}).second)
+    ASSERT_TRUE(
+        paletteDispatches_.insert({logarithms, dispatch.variant.scales, dispatch.variant.rigid})
+            .second)
         << "one dispatch for all palettes of a form";
     ASSERT_EQ(push.workgroupCount, dispatch.workgroupCount);
     for (std::uint32_t number = 0; number < push.workgroupCount; ++number) {
@@ -170,11 +172,13 @@ class Simulation {
                                logarithms};
       ASSERT_TRUE(statuses_.emplace(form, status).second) << "twice in a form";
       ASSERT_EQ(record.jointCount, palette.jointCount);
-      ASSERT_EQ(dispatch.variant.scales, palette.mayScale);
+      ASSERT_EQ(dispatch.variant.scales, palette.promise == JointPromise::scaling);
+      ASSERT_EQ(dispatch.variant.rigid, palette.promise == JointPromise::rigid);
       // A joint: 8 floats of a dual quaternion, 12 of a logarithm, 8 of scale and shear.
-      paletteEnds_[status] = status + 16 +
-                             std::uint64_t{palette.jointCount} *
-                                 ((logarithms ? 48u : 32u) + (palette.mayScale ? 32u : 0u));
+      paletteEnds_[status] =
+          status + 16 +
+          std::uint64_t{palette.jointCount} *
+              ((logarithms ? 48u : 32u) + (palette.promise == JointPromise::scaling ? 32u : 0u));
     }
   }
 
@@ -379,7 +383,9 @@ class Simulation {
     ASSERT_TRUE(anyBefore || !reads);
   }
 
-  bool mayScale(const Job& job) const { return batch_.poses[job.pose].mayScale; }
+  bool mayScale(const Job& job) const {
+    return batch_.poses[job.pose].promise == JointPromise::scaling;
+  }
 
   std::uint64_t paletteBytes(Method method, std::uint32_t palette) const {
     return method == Method::linear ? batch_.poses[palette].matrixOffset
@@ -483,7 +489,7 @@ class Simulation {
   std::vector<std::vector<std::uint8_t>> written_;      ///< by job and vertex: a bit a stream
   std::map<PaletteInForm, std::uint64_t> statuses_;     ///< bytes into the palettes
   std::map<std::uint64_t, std::uint64_t> paletteEnds_;  ///< by where they begin
-  std::set<std::pair<bool, bool>> paletteDispatches_;   ///< logarithms, scales
+  std::set<std::array<bool, 3>> paletteDispatches_;     ///< logarithms, scales, rigid
   std::set<std::uint32_t> cleared_;
   std::uint64_t resultCount_ = 0;
 };
@@ -520,7 +526,7 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
 
 OwnedBatch::OwnedBatch(PackedMesh mesh, std::uint32_t joints) {
   addMesh(std::move(mesh));
-  addPose(joints, false);
+  addPose(joints, JointPromise::scaleIgnored);
 }
 
 void OwnedBatch::addMesh(PackedMesh mesh) {
@@ -529,8 +535,8 @@ void OwnedBatch::addMesh(PackedMesh mesh) {
   meshes.push_back(std::move(mesh));
 }
 
-void OwnedBatch::addPose(std::uint32_t joints, bool mayScale) {
-  poses.push_back({joints, posesSize, mayScale});
+void OwnedBatch::addPose(std::uint32_t joints, JointPromise promise) {
+  poses.push_back({joints, posesSize, promise});
   posesSize += std::uint64_t{joints} * 48;
 }
 
@@ -604,7 +610,8 @@ OwnedBatch batchOfFiveMeshes() {
   batch.addMesh(meshOf(64, 4, 5, MeshParts{true, true, 3}));
   batch.addMesh(meshOf(65, 8, 5, MeshParts{true, true, 9}));
   batch.addMesh(meshOf(1234, 3, 5, MeshParts{true, false, 5}));
-  for (const std::uint32_t joints : {5u, 9u, 300u, 7u}) batch.addPose(joints, joints % 2 == 1);
+  for (const std::uint32_t joints : {5u, 9u, 300u, 7u})
+    batch.addPose(joints, static_cast<JointPromise>(joints % 3));
   return batch;
 }
 

@@ -46,7 +46,7 @@ struct OwnedBatch {
   ByStream<std::uint64_t> separateSizes{};  ///< … or of these
 
   void addMesh(PackedMesh mesh);
-  void addPose(std::uint32_t joints, bool mayScale);
+  void addPose(std::uint32_t joints, JointPromise promise);
 
   /// Positions, and normals behind them, as float32x3 in a stretch of its own at the output's end.
   Job& addJob(std::uint32_t mesh, std::uint32_t pose, Method method, bool normals,

@@ -179,10 +179,11 @@ void planEverything(const Job& layout, const DeviceLimits& limits, const Tuning&
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u}) {
     OwnedBatch batch;
     batch.addMesh(meshOf(10, influences, 8, MeshParts{true, true, 2}));
-    batch.addPose(8, false);
-    batch.addPose(8, true);
+    batch.addPose(8, JointPromise::scaleIgnored);
+    batch.addPose(8, JointPromise::scaling);
+    batch.addPose(8, JointPromise::rigid);
     for (const float weight : {0.0f, 1.0f}) {
-      for (const std::uint32_t choice : {0u, 1u, 2u, 3u}) {
+      for (const std::uint32_t choice : {0u, 1u, 2u, 3u, 4u, 5u}) {
         const std::uint32_t palette = choice / 2;
         batch.jobs = {layout};
         batch.jobs[0].mesh = batch.jobOf(0, palette, layout.method).mesh;
@@ -343,7 +344,7 @@ TEST(Plan, AJobRunsInTheSameVariantWhateverElseIsInTheBatch) {
 // A kernel leaves the two-phase path out if no palette that it reads may scale.
 TEST(Plan, AJobScalesIfAPoseThatItReadsMay) {
   OwnedBatch batch(meshOf(10, 4, 8, MeshParts{true, false, 0}), 8);
-  batch.addPose(8, true);
+  batch.addPose(8, JointPromise::scaling);
   const auto scales = [&](const Job& job) {
     batch.jobs = {job};
     Plan out;

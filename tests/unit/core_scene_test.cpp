@@ -190,7 +190,9 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
           info.byteSize = 4096;
           InstanceDescription figure;
           figure.mesh = *owner.addMesh(info);
-          figure.pose = *scene.addPose(4, {.mayScale = choices % 2 != 0});
+          figure.pose = *scene.addPose(
+              4,
+              {.promise = choices % 2 != 0 ? JointPromise::scaling : JointPromise::scaleIgnored});
           figure.method = method;
           figure.bounds = choices / 2 % 2 != 0;
           figure.culledOnGpu = choices / 4 != 0;
@@ -208,7 +210,7 @@ TEST(Scene, TellsThePipelinesOfOneInstance) {
   // Without a mesh and a pose: for all.
   const PlannedScene empty(description);
   const PipelineNeeds all = must(empty.scene().pipelineNeeds({}));
-  EXPECT_FALSE(all.mesh || all.mayScale);
+  EXPECT_FALSE(all.mesh || all.promise);
   EXPECT_FALSE(empty.scene().pipelineNeeds({.mesh = {0, 1}}).ok());
 }
 

@@ -58,7 +58,8 @@ class DERMIS_CPU_API Mesh {
 /// One instance of a job.
 struct Instance {
   std::span<const JointMatrix> pose;  ///< at least `MeshInfo::requiredJoints`
-  bool mayScale = true;               ///< as `PoseDescription::mayScale`
+  /// As `PoseDescription::promise`. `rigid` is as good as `scaleIgnored` here.
+  JointPromise promise = JointPromise::scaling;
   /// The memory of each attribute, from which the offsets in `Job::places` count: `all(memory)` for
   /// the offsets of `placeVertices`, or an array for each attribute, usually with offsets of 0.
   /// Null for attributes that the job does not write. An attribute needs offset + (vertexCount - 1)
@@ -102,7 +103,7 @@ DERMIS_CPU_API Result<void> skin(const Job& job);
 /// Computes the positions of some vertices of an instance, for example for picking, or for objects
 /// that are attached to a vertex. `vertices` are in any order. `positions` has three floats for
 /// each; for finite poses they are the values that `skin` writes as float32x3. Of `instance` it
-/// uses pose, `mayScale` and `morphs` only. O(vertices × influences); it allocates. Fails as `skin`
+/// uses pose, `promise` and `morphs` only. O(vertices × influences); it allocates. Fails as `skin`
 /// does, and with `invalidArgument` if the mesh does not have a vertex or `positions` has the wrong
 /// size.
 DERMIS_CPU_API Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& instance,

@@ -29,6 +29,19 @@ struct JointMatrix {
 };
 static_assert(sizeof(JointMatrix) == 48);
 
+/// What a pose promises of its joints. The less can happen, the less time pipelines take to be
+/// created, and joints to be converted. Rigid joints give the same vertices with each.
+enum class JointPromise : std::uint8_t {
+  /// Nothing: joints may scale, shear and mirror. Many exporters leave a scale in joints.
+  scaling = 0,
+  /// Scale and shear are ignored: of each joint only the rotation of its polar decomposition and
+  /// its
+  /// translation count.
+  scaleIgnored = 1,
+  /// Joints only rotate and translate. One that does more rotates by an unspecified rotation.
+  rigid = 2,
+};
+
 /// Converts a column-major 4×4 matrix, as GLM stores it. A row-major matrix for row vectors, as of
 /// DirectXMath, has the same bytes. The last row (column), which should be 0 0 0 1, is not read.
 inline JointMatrix toJointMatrix(std::span<const float, 16> columnMajor) {
@@ -446,8 +459,8 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// this pose, including rounding errors. It is in the space of the pose. In ordinary poses it is a
 /// few percent larger than necessary; docs/bounds.md has the formulas, the proof and numbers.
 ///
-/// `mayScale` is that of the pose (`PoseDescription::mayScale`). If false, the box is that of the
-/// joints without their scale, except for `linear`, which always scales.
+/// `promise` is that of the pose. If it is not `scaling`, the box is that of the joints without
+/// their scale, except for `linear`, which always scales. If it is broken, the box proves nothing.
 ///
 /// There is a proof for `linear`, `dualQuaternion` and `blended`. For all other methods the box is
 /// infinite.
@@ -461,7 +474,7 @@ DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint3
 /// O(joints + pairs + trios). Any thread. Needs 32 KiB of stack, and allocates only if more than
 /// 128 joints move vertices.
 DERMIS_CORE_API Box skinnedBounds(const JointBounds& bounds, std::span<const JointMatrix> pose,
-                                  Method method, bool mayScale = true);
+                                  Method method, JointPromise promise = JointPromise::scaling);
 
 // ---- Computes centers of rotation: for each vertex, the point about which the blended rotation of
 // its joints rotates it. They are computed once, at import, from the bind pose. Source: Le and

@@ -83,12 +83,11 @@ struct Tuning {
 struct PoseDescription {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPoseJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the poses buffer, a multiple of 16
-  /// Whether joints may scale or shear; many exporters leave a scale in joints. Takes 32 more bytes
-  /// of the palettes buffer per joint and, on lavapipe, more time even if no joint scales. If
-  /// false, scale and shear are ignored (rotation only) and counted in `PoseStatus`. But
-  /// `Method::linear` always applies them; if `mayScale` is false, its normals and tangents are
-  /// right only for scales between 2^-20 and 2^30.
-  bool mayScale = true;
+  /// `scaling` takes 32 more bytes of the palettes buffer per joint and, on lavapipe, more time
+  /// even if no joint scales. Otherwise joints that scale are counted in `PoseStatus`. But
+  /// `Method::linear` always applies scale and shear; without `scaling`, its normals and tangents
+  /// are right only for scales between 2^-20 and 2^30.
+  JointPromise promise = JointPromise::scaling;
 };
 
 /// One instance: a mesh, a pose, and where its skinned vertices are written. Two jobs of a batch
@@ -192,7 +191,7 @@ struct PipelineNeeds {
   /// What is true of all meshes: `maxInfluences` is the maximum, `minInfluences` the minimum, and
   /// `morphTargetCount` is not 0 if any mesh has morph targets. Other members are ignored.
   std::optional<MeshInfo> mesh = {};
-  std::optional<bool> mayScale = {};  ///< `PoseDescription::mayScale` of all poses
+  std::optional<JointPromise> promise = {};  ///< of all poses
 };
 
 /// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
@@ -343,7 +342,7 @@ using Command =
 struct PoseStatus {
   std::uint32_t twoPhase = 0;         ///< 1 if vertices are skinned in two phases: scale, rotation
   std::uint32_t nonRigidJoints = 0;   ///< joints with scale, shear or a mirror
-  std::uint32_t undeclaredScale = 0;  ///< joints whose scale was ignored, as `mayScale` is false
+  std::uint32_t undeclaredScale = 0;  ///< joints whose scale was ignored, as none was promised
   std::uint32_t nonFiniteJoints = 0;  ///< joints with a NaN or an infinity
 };
 

@@ -80,7 +80,7 @@ struct PoseOptions {
   /// frame. If true: a GPU pass of the engine, always to the same memory; the engine then calls
   /// `markWritten`.
   bool writtenByGpu = false;
-  bool mayScale = true;  ///< as `PoseDescription::mayScale`
+  JointPromise promise = JointPromise::scaling;  ///< as `PoseDescription::promise`
 };
 
 /// One instance of a scene.
@@ -270,7 +270,7 @@ class DERMIS_CORE_API Scene {
 
   /// What `vulkan::Context::prepare` needs before such an instance is recorded. If both handles are
   /// valid, only for instances with the same method whose mesh has the same minimum and maximum of
-  /// influences and whose pose has the same `mayScale`: two kernels for most instances. If a handle
+  /// influences and whose pose has the same promise: two kernels for most instances. If a handle
   /// is null, for any mesh or pose: up to nine. Fails with `invalidArgument` if the method is not
   /// valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;

@@ -214,7 +214,7 @@ TaskInstance SceneRunner::State::taskInstance(const Work::Instance& instance, co
   TaskInstance skinned;
   const ScenePose& pose = books().poses_.at(instance.pose);
   skinned.pose = books().matricesOf(pose);
-  skinned.mayScale = pose.mayScale;
+  skinned.mayScale = pose.promise == JointPromise::scaling;
   skinned.restartsMotion = (instance.flags & abi::INSTANCE_RESTARTS) != 0;
   skinned.settles = (instance.flags & abi::INSTANCE_SETTLES) != 0;
   if (instance.extras != nullptr) {

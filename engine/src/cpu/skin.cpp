@@ -28,7 +28,7 @@ Result<void> checkLayout(const Job& job) {
   // Offsets are relative to the engine's addresses.
   for (OutputAttribute& attribute : checked.places.attributes) attribute.offset = 0;
   checked.box = {{-1, -1, -1}, {1, 1, 1}};
-  const PoseDescription pose{info.requiredJoints, 0, true};
+  const PoseDescription pose{info.requiredJoints, 0};
   Batch batch;
   batch.poses = {&pose, 1};
   batch.meshesSize = info.byteSize;
@@ -58,6 +58,7 @@ Result<void> checkInstance(const Job& job, const Instance& instance, const Subje
     return good;
   if (!std::ranges::is_sorted(instance.morphs, {}, &MorphWeight::target))
     return wrong(subject.name() + ": its morph targets are not in ascending order");
+  if (Result<void> good = checkPromise(instance.promise, subject); !good) return good;
   if (isSnormPosition(job.places[Stream::positions].format) && !isBox(instance.box)) {
     return wrong(subject.name() +
                  ": the box of its snorm16 positions must be finite, with sides longer than 0");
@@ -89,7 +90,7 @@ Result<void> check(const Job& job) {
 TaskInstance taskInstance(const Instance& instance, const VertexPlaces& places) {
   TaskInstance own;
   own.pose = instance.pose;
-  own.mayScale = instance.mayScale;
+  own.mayScale = instance.promise == JointPromise::scaling;
   own.restartsMotion = instance.restartsMotion;
   own.settles = instance.settles;
   own.morphs = instance.morphs;
@@ -152,7 +153,7 @@ Result<void> skinVertices(const Mesh& mesh, Method method, const Instance& insta
   }
   Instance own;
   own.pose = instance.pose;
-  own.mayScale = instance.mayScale;
+  own.promise = instance.promise;
   own.morphs = instance.morphs;
   float none = 0;  // of an empty list
   own.output[Stream::positions] = positions.empty() ? &none : positions.data();

@@ -31,7 +31,8 @@ struct TaskInstance {
   std::span<const JointMatrix> pose;
   /// Address of each attribute of the mesh's first vertex, indexed by `Stream`.
   ByStream<std::byte*> outputs{};
-  bool mayScale = true, restartsMotion = false, settles = false;
+  bool mayScale = true;  ///< whether its promise is `JointPromise::scaling`
+  bool restartsMotion = false, settles = false;
   std::span<const MorphWeight> morphs;  ///< in ascending order of targets
   InstanceResult* result = nullptr;
   float boxCenter[3] = {}, boxInverse[3] = {};  ///< for snorm16 positions; `boxInverse` is 1 / half

@@ -91,6 +91,7 @@ std::vector<std::uint32_t> constantsOf(const Variant& variant) {
   set(abi::CONSTANT_MORPHS, variant.morphs);
   set(abi::CONSTANT_BOUNDS, variant.bounds);
   set(abi::CONSTANT_SCALES, variant.scales);
+  set(abi::CONSTANT_RIGID, variant.rigid);
   set(abi::CONSTANT_FULL, variant.fullInfluences);
   set(abi::CONSTANT_RECORD, variant.pairs ? abi::RECORD_IN_PAIRS : variant.recordBytes);
   return constants;
@@ -120,7 +121,9 @@ std::string pipelineName(const Variant& variant) {
            (variant.method == Method::linear      ? "matrices"
             : variant.method == Method::logMatrix ? "logarithms"
                                                   : "dual quaternions") +
-           (variant.scales ? " with joints that scale" : "");
+           (variant.scales  ? " with joints that scale"
+            : variant.rigid ? " of rigid joints"
+                            : "");
   }
   if (variant.kernel == Kernel::clear) return "clear kernel";
   if (variant.kernel == Kernel::visibility)

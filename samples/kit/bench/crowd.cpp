@@ -97,7 +97,7 @@ std::vector<SkinRequest> Crowd::requests(Method method, std::uint32_t count) con
     SkinRequest& request = requests.emplace_back();
     request.mesh = &*mesh;
     request.pose = pose;
-    request.mayScale = false;
+    request.promise = JointPromise::scaleIgnored;
     request.method = method;
   }
   return requests;

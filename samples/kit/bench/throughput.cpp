@@ -209,7 +209,7 @@ class CpuCrowd {
       const std::uint32_t count = std::min(instancesOfJob, end - begin);
       for (std::uint32_t i = 0; i < count; ++i) {
         instances[i].pose = crowd_->poses[begin + i];
-        instances[i].mayScale = false;
+        instances[i].promise = JointPromise::scaleIgnored;
         instances[i].output.fill(reinterpret_cast<std::byte*>(output_.data()) +
                                  places_.size * (begin + i));
       }

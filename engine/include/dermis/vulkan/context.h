@@ -289,7 +289,7 @@ class DERMIS_VULKAN_API Context {
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with these needs can use, in plans that are made with
-  /// `tuning()`. For other tunings use `pipelines`. If `PipelineNeeds::mesh` and `mayScale` are
+  /// `tuning()`. For other tunings use `pipelines`. If `PipelineNeeds::mesh` and `promise` are
   /// empty, these are the pipelines for any mesh, pose and morph targets. Once all needs are
   /// prepared, `record` never fails with `notPrepared`. May take long: call it from a loading
   /// thread. If it fails (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of

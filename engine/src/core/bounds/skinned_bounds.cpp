@@ -459,7 +459,8 @@ Box boundsBy(const JointBoundsData& bounds, std::span<const JointMatrix> palette
 }  // namespace
 
 Box skinnedBounds(const JointBounds& jointBounds, std::span<const JointMatrix> palette,
-                  Method method, bool mayScale) {
+                  Method method, JointPromise promise) {
+  const bool mayScale = promise == JointPromise::scaling;
   const JointBoundsData& bounds = JointBoundsData::of(jointBounds);
   switch (method) {
     case Method::linear:

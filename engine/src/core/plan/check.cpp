@@ -174,6 +174,11 @@ Result<void> checkMethod(Method method, const Subject& subject) {
   return notAValue(subject.name() + ": its method", method, "Method");
 }
 
+Result<void> checkPromise(JointPromise promise, const Subject& subject) {
+  if (promise <= JointPromise::rigid) return {};
+  return notAValue(subject.name() + ": its promise", promise, "JointPromise");
+}
+
 Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
                           const Subject& subject) {
   if (!isPositionFormat(positions)) return wrongFormat(positions, "positions", subject);
@@ -207,9 +212,10 @@ Result<void> checkVariant(const Variant& variant) {
   const auto isOneOf = [](std::uint32_t value, std::initializer_list<std::uint32_t> values) {
     return std::ranges::find(values, value) != values.end();
   };
+  const bool mayBeRigid = variant.kernel == Kernel::palette && !variant.scales;
   if (!isOneOf(variant.recordBytes, {0, 8, 12, 16, 24, 32}) ||
-      !isOneOf(variant.influences, {0, 1, 2, 4}))
-    return invalid("the variant's recordBytes or influences are none that a plan uses");
+      !isOneOf(variant.influences, {0, 1, 2, 4}) || (variant.rigid && !mayBeRigid))
+    return invalid("the variant's recordBytes, influences or rigid are none that a plan uses");
   return checkTuning({variant.workgroupSize, variant.instancesPerInvocation});
 }
 
@@ -222,6 +228,9 @@ Result<void> checkPipeline(PipelineId id) {
 
 Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
   if (Result<void> good = checkMethod(needs.method, {"the instance"}); !good) return good.error();
+  if (needs.promise) {
+    if (Result<void> good = checkPromise(*needs.promise, {"the pose"}); !good) return good.error();
+  }
   const Result<VertexPlaces> places = placeVertices(needs.layout, 1);
   if (!places) return places;
   Job job;
@@ -375,6 +384,7 @@ Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index) {
   // Made only for errors, since this function runs for every pose of every plan.
   const auto name = [index] { return "pose " + std::to_string(index); };
+  if (Result<void> good = checkPromise(pose.promise, {"pose", index}); !good) return good;
   if (pose.jointCount == 0 || pose.jointCount > maxPoseJoints) {
     return invalid(name() + " has " + std::to_string(pose.jointCount) +
                    " joints, but it may have 1 to " + std::to_string(maxPoseJoints));

@@ -38,6 +38,8 @@ Result<void> checkLimits(const DeviceLimits& limits);
 
 /// Whether the number is a value of `Method`.
 DERMIS_CORE_API Result<void> checkMethod(Method method, const Subject& subject);
+/// Whether the number is a value of `JointPromise`.
+DERMIS_CORE_API Result<void> checkPromise(JointPromise promise, const Subject& subject);
 /// Whether positions, normals and tangents may have these formats.
 Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
                           const Subject& subject);

@@ -121,11 +121,11 @@ Result<void> Encoder::addPaletteDispatches() {
   for (std::uint32_t buffer = 0; buffer < work_->poses.size(); ++buffer) {
     const Work::Poses& lists = work_->poses[buffer];
     for (std::size_t form = 0; form < paletteFormCount; ++form) {
-      for (const bool mayScale : {false, true}) {
-        const std::span<const abi::PaletteRecord> records = lists.records[form][mayScale];
+      for (std::size_t promise = 0; promise < jointPromiseCount; ++promise) {
+        const std::span<const abi::PaletteRecord> records = lists.records[form][promise];
         if (records.empty()) continue;
-        const Variant variant =
-            paletteVariant(static_cast<PaletteForm>(form), mayScale, limits_, tuning_);
+        const Variant variant = paletteVariant(
+            static_cast<PaletteForm>(form), static_cast<JointPromise>(promise), limits_, tuning_);
         if (Result<void> good = addPaletteDispatch(variant, records, lists.joints, buffer); !good)
           return good;
       }

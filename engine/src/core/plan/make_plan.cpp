@@ -61,7 +61,7 @@ void PlanMaker::placePalettes(const Batch& batch) {
     for (std::size_t index = 0; index < units.size(); ++index) {
       if (units[index] == notUsed) continue;
       units[index] = static_cast<std::uint32_t>(end);
-      end += paletteSize(form, batch.poses[index].jointCount, batch.poses[index].mayScale);
+      end += paletteSize(form, batch.poses[index].jointCount, batch.poses[index].promise);
     }
   }
   palettesSize_ = end * unitBytes;
@@ -102,7 +102,7 @@ Result<void> PlanMaker::placeJobs(const Batch& batch, const DeviceLimits& limits
     firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
     const PoseDescription& pose = batch.poses[job.pose];
     placing.jointCount = pose.jointCount;
-    placing.mayScale = pose.mayScale;
+    placing.mayScale = pose.promise == JointPromise::scaling;
     if (placed) placed = groups_.place(job, streams, placing, limits, tuning, runs_);
   }
   firstRuns_.push_back(static_cast<std::uint32_t>(runs_.size()));
@@ -136,7 +136,7 @@ void PlanMaker::addPalettes(const Batch& batch) {
       if (units[index] == notUsed) continue;
       const PoseDescription& pose = batch.poses[index];
       work_.addPose({static_cast<std::uint32_t>(pose.matrixOffset / unitBytes)}, units[index],
-                    pose.jointCount, form, pose.mayScale);
+                    pose.jointCount, form, pose.promise);
     }
   }
 }

@@ -213,13 +213,14 @@ Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tunin
   return variant;
 }
 
-Variant paletteVariant(PaletteForm form, bool mayScale, const DeviceLimits& limits,
+Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
                        const Tuning& tuning) {
   Variant variant = variantOf(Kernel::palette, limits, tuning);
   variant.method = form == PaletteForm::matrices     ? Method::linear
                    : form == PaletteForm::logarithms ? Method::logMatrix
                                                      : Method::dualQuaternion;
-  variant.scales = mayScale && form != PaletteForm::matrices;
+  variant.scales = promise == JointPromise::scaling && form != PaletteForm::matrices;
+  variant.rigid = promise == JointPromise::rigid && form != PaletteForm::matrices;
   return variant;
 }
 
@@ -228,15 +229,18 @@ namespace {
 /// The values that are possible for all instances.
 struct FormRanges {
   FormRanges() = default;
-  FormRanges(const std::optional<MeshInfo>& mesh, std::optional<bool> mayScale) {
+  FormRanges(const std::optional<MeshInfo>& mesh, std::optional<JointPromise> promise) {
     if (mesh) influences = {mesh->maxInfluences};
     if (mesh) full = {mesh->minInfluences == mesh->maxInfluences};
     if (mesh && mesh->morphTargetCount == 0) morphs = {false};
-    if (mayScale) scales = {*mayScale};
+    if (promise) promises = {*promise};
+    if (promise) scales = {*promise == JointPromise::scaling};
   }
 
   std::vector<std::uint32_t> influences{1, 2, 4, 5};
   std::vector<bool> full{false, true}, morphs{false, true}, scales{false, true};
+  std::vector<JointPromise> promises{JointPromise::scaling, JointPromise::scaleIgnored,
+                                     JointPromise::rigid};
 };
 
 /// The kernels before the skin kernel.
@@ -244,9 +248,9 @@ std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
                                      const DeviceLimits& limits, const Tuning& tuning) {
   std::vector<Variant> variants;
   const PaletteForm form = paletteForm(job.method);
-  for (const bool mayScale : ranges.scales) {
+  for (const JointPromise promise : ranges.promises) {
     if (form != PaletteForm::matrices)
-      variants.push_back(paletteVariant(form, mayScale, limits, tuning));
+      variants.push_back(paletteVariant(form, promise, limits, tuning));
   }
   if (hasResult(job)) variants.push_back(variantOf(Kernel::clear, limits, tuning));
   return variants;
@@ -299,10 +303,11 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   job.method = needs.method;
   job.bounds = needs.bounds;
   job.places = *places;
-  const FormRanges ranges(needs.mesh, needs.mayScale);
+  const FormRanges ranges(needs.mesh, needs.promise);
   std::vector<Variant> variants = earlierVariants(job, ranges, limits, tuning);
   if (needs.method == Method::linear)  // a scene copies them
-    variants.push_back(paletteVariant(PaletteForm::matrices, false, limits, tuning));
+    variants.push_back(
+        paletteVariant(PaletteForm::matrices, JointPromise::scaling, limits, tuning));
   // `placeVertices` aligns what it places.
   appendForms(layoutVariant(job, limits, tuning), ranges, variants);
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));

@@ -68,6 +68,7 @@ inline bool writesStream(const Variant& variant, std::size_t stream) {
 /// The form of a joint in the palettes buffer.
 enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
 inline constexpr std::size_t paletteFormCount = 3;
+inline constexpr std::size_t jointPromiseCount = 3;
 
 /// The form that a method reads. In a batch, matrices are not copied to the palettes buffer but
 /// read in place.
@@ -77,7 +78,7 @@ inline PaletteForm paletteForm(Method method) {
 }
 
 /// Matrices are copied, whether they scale or not.
-Variant paletteVariant(PaletteForm form, bool mayScale, const DeviceLimits& limits,
+Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
                        const Tuning& tuning);
 /// The clear or the visibility kernel.
 Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);

@@ -16,6 +16,7 @@ void visitFields(AnyVariant& variant, const Field& field) {
   field(variant.pairs, 1);
   field(variant.texels, 1);
   field(variant.scales, 1);
+  field(variant.rigid, 1);
   field(variant.bounds, 1);
   field(variant.morphs, 1);
   field(variant.motion, 1);

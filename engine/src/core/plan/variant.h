@@ -25,8 +25,8 @@ enum class Kernel : std::uint8_t {
 ///
 /// `kernel`, `workgroupSize` and `oneOutput` apply to all kernels. The palette kernel also has
 /// `method`, which is what joints are converted to (dualQuaternion: dual quaternions, logMatrix:
-/// logarithms, linear: unchanged matrices), and `scales`. All other members apply to the skin
-/// kernel only.
+/// logarithms, linear: unchanged matrices), `scales`, and `rigid`, which only it has. All other
+/// members apply to the skin kernel only.
 struct Variant {
   Kernel kernel = Kernel::skin;
   Method method = Method::dualQuaternion;
@@ -40,8 +40,10 @@ struct Variant {
   /// Whether instances have active morph targets.
   bool morphs = false;
   bool bounds = false;
-  /// Whether joints may scale or shear (`PoseDescription::mayScale`).
+  /// Whether joints may scale or shear (`JointPromise::scaling`).
   bool scales = false;
+  /// Whether joints are taken for rigid (`JointPromise::rigid`).
+  bool rigid = false;
   /// Whether tables, meshes and palettes are read through uniform texel buffers, not storage
   /// buffers.
   bool texels = false;

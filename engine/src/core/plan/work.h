@@ -18,11 +18,12 @@ namespace dermis {
 inline constexpr std::uint64_t unitBytes = 16;  ///< offsets into palettes and matrices count these
 
 /// Units of a palette: its status, its joints, and their scale/shear parts; or its matrices alone.
-inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, bool mayScale) {
+inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, JointPromise promise) {
   if (form == PaletteForm::matrices) return std::uint64_t{jointCount} * abi::UNITS_OF_MATRIX;
   const std::uint32_t joint =
       form == PaletteForm::logarithms ? abi::UNITS_OF_LOGARITHM : abi::UNITS_OF_DUAL_QUATERNION;
-  return 1 + std::uint64_t{jointCount} * (joint + (mayScale ? 2 : 0));
+  return 1 + std::uint64_t{jointCount} *
+                 (joint + (promise == JointPromise::scaling ? abi::UNITS_OF_SCALE_SHEAR : 0));
 }
 
 /// What only some instances have.
@@ -54,10 +55,11 @@ struct PoseSource {
 
 /// Call `begin`, add palettes and instances in any order, then `arrange`.
 struct Work {
-  /// Poses of one pose buffer, by form, without and with scale.
+  /// Poses of one pose buffer, by form and promise.
   struct Poses {
     BufferRole joints = BufferRole::poses;
-    std::array<std::array<std::vector<abi::PaletteRecord>, 2>, paletteFormCount> records;
+    std::array<std::array<std::vector<abi::PaletteRecord>, jointPromiseCount>, paletteFormCount>
+        records;
   };
   struct Instance {
     const PlacedRun* run;
@@ -86,11 +88,11 @@ struct Work {
 
   /// A batch has only pose buffer 0.
   void addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
-               PaletteForm form, bool mayScale) {
+               PaletteForm form, JointPromise promise) {
     while (poses.size() <= source.buffer) poses.emplace_back();
     Poses& lists = poses[source.buffer];
     lists.joints = source.role;
-    lists.records[static_cast<std::size_t>(form)][mayScale].push_back(
+    lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)].push_back(
         {source.unit, outputUnit, joints, 0});
     ++poseCount;
   }

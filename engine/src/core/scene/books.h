@@ -92,7 +92,7 @@ struct ScenePose {
   };
 
   std::uint32_t jointCount = 0;
-  bool mayScale = true;
+  JointPromise promise = JointPromise::scaling;
   bool writtenByGpu = false;
   std::uint32_t buffer = 0;  ///< its number
   Range joints;              ///< in that buffer, of all slots together

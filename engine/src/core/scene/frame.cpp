@@ -47,7 +47,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
   const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                           pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
-  work_.addPose(source, converted.unit, pose.jointCount, form, pose.mayScale);
+  work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,

@@ -66,7 +66,7 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
                    std::to_string(instance.poseHandle.index) + " has " +
                    std::to_string(pose->jointCount));
   }
-  const PoseDescription own{pose->jointCount, 0, pose->mayScale};
+  const PoseDescription own{pose->jointCount, 0, pose->promise};
   Batch batch;
   batch.poses = {&own, 1};
   batch.meshesSize = meshStore_.ranges.capacity();
@@ -102,7 +102,7 @@ Result<void> SceneBooks::reserveUnits(const SceneInstance& instance) {
   ScenePose& pose = poses_.at(instance.poseHandle.index);
   std::uint32_t& unit = pose.forms[static_cast<std::size_t>(form)].unit;
   if (unit != notUsed) return {};
-  const std::uint64_t size = paletteSize(form, pose.jointCount, pose.mayScale);
+  const std::uint64_t size = paletteSize(form, pose.jointCount, pose.promise);
   const Result<std::optional<Range>> taken = take(unitStore_, size, 1);
   if (!taken) return taken.error();
   if (*taken) {
@@ -148,7 +148,7 @@ Result<void> SceneBooks::makeRuns(SceneInstance& instance, bool isCulled) {
   placing.subject = theInstance;
   placing.windows = {ByStream<std::uint64_t>::all(outputStore_.ranges.capacity()), limits_};
   placing.jointCount = pose.jointCount;
-  placing.mayScale = pose.mayScale;
+  placing.mayScale = pose.promise == JointPromise::scaling;
   placing.isCulled = isCulled;
   runsScratch_.clear();
   const Job job = jobOf(instance, mesh, *laidOut);

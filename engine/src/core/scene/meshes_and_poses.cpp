@@ -72,6 +72,7 @@ Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCou
     return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
+  if (Result<void> good = checkPromise(options.promise, {"the pose"}); !good) return good;
   if (books.owner_.isCpu && options.writtenByGpu)
     return invalid("a pose that the GPU writes cannot be skinned on the CPU");
   if (poses.empty()) return {};
@@ -82,7 +83,7 @@ Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCou
   if (!joints) return joints.error();
   if (!*joints) return books.noJoints(poses.size(), count, options.writtenByGpu);
   pose.jointCount = jointCount;
-  pose.mayScale = options.mayScale;
+  pose.promise = options.promise;
   pose.writtenByGpu = options.writtenByGpu;
   const std::uint64_t size = std::uint64_t{jointCount} * books.slotsOf(options.writtenByGpu);
   for (std::size_t index = 0; index < poses.size(); ++index) {
@@ -106,7 +107,7 @@ Result<void> Scene::removePose(PoseHandle handle) {
     const std::uint32_t unit = pose->forms[form].unit;
     if (unit == notUsed) continue;
     books.retire(books.unitStore_.ranges, {unit, paletteSize(static_cast<PaletteForm>(form),
-                                                             pose->jointCount, pose->mayScale)});
+                                                             pose->jointCount, pose->promise)});
   }
   books.poses_.remove(handle);
   return {};

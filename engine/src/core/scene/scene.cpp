@@ -171,7 +171,7 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
   if (description.pose) {
     const ScenePose* pose = books_->poses_.find(description.pose);
     if (pose == nullptr) return unknownHandle("pose", description.pose);
-    needs.mayScale = pose->mayScale;
+    needs.promise = pose->promise;
   }
   if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   return needs;

@@ -174,7 +174,7 @@ bool holds(const Box& box, const reference::Double3& point) {
 
 /// One instance a method, in the vertices that the engine draws.
 Result<void> planBatch(const MeshInfo& info, const Box& box) {
-  const PoseDescription palette{jointCount, 0, true};
+  const PoseDescription palette{jointCount, 0, JointPromise::scaling};
   const MorphWeight morph{0, 0.75f};
   std::vector<Job> jobs;
   for (const Method method : allMethods) {
