@@ -1,5 +1,7 @@
 #include "mock_vulkan.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
