@@ -49,9 +49,9 @@ std::vector<Instruction> instructionsOf(std::span<const std::uint32_t> words) {
 }
 
 /// Counts the operations of a kernel with all functions inlined into `main`. It has a loop over
-/// instances; on CPU devices three nested loops, over vertices, runs and instances. Code outside
-/// them runs once per vertex and invocation; loops inside them run for each influence except the
-/// first. An `fma` counts once.
+/// instances; on CPU devices it is in another, over runs of instances. Code outside them runs once
+/// per vertex and invocation. What is in further loops counts once: none is over influences. An
+/// `fma` counts once.
 double countOperations(std::span<const std::uint32_t> words, std::size_t instanceLoops) {
   const std::vector<Instruction> instructions = instructionsOf(words);
   std::unordered_map<std::uint32_t, double> floats;  // of types
@@ -73,10 +73,7 @@ double countOperations(std::span<const std::uint32_t> words, std::size_t instanc
     if (!isInFunction || !isArithmetic(opcode)) continue;
     const auto type = floats.find(operands[0]);
     if (type == floats.end()) continue;
-    const double times = loops.size() < instanceLoops   ? 1.0 / instancesEach
-                         : loops.size() > instanceLoops ? influences - 1
-                                                        : 1;
-    operations += times * type->second;
+    operations += type->second / (loops.size() < instanceLoops ? instancesEach : 1);
   }
   return operations;
 }
@@ -131,7 +128,7 @@ std::optional<ByteModel> modelOf(const Layout& layout, Method method, const char
   model.meshRead =
       (16.0 + (layout.normals == VertexFormat::none ? 0 : 16) + 8 * influences) / instancesEach;
   model.paletteRead = influences * (method == Method::linear ? 48 : 32);
-  model.operations = countOperations(spirv, pipeline->texelBuffers != 0 ? 3 : 1);
+  model.operations = countOperations(spirv, pipeline->texelBuffers != 0 ? 2 : 1);
   return model;
 }
 
