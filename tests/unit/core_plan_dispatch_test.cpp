@@ -38,8 +38,8 @@ TEST(Plan, OneThousandInstancesOfThreeMeshesInFourteenDispatches) {
   EXPECT_LE(out.buffer(BufferRole::tables).size / 4, 500 * 4 + 1000 * 8 + 3 * (4 + 4) * 12u);
 }
 
-// However many instances and meshes there are: the palettes of each promise, then a dispatch for each form of the
-// kernel.
+// However many instances and meshes there are: the palettes of each promise, then a dispatch for
+// each form of the kernel.
 TEST(Plan, OneMethodAndLayoutIsAFewDispatchesAfterThePalettes) {
   OwnedBatch batch = batchOfFiveMeshes();
   for (int repetition = 0; repetition < 20; ++repetition) {

@@ -34,8 +34,7 @@ static_assert(sizeof(JointMatrix) == 48);
 enum class JointPromise : std::uint8_t {
   /// Nothing: joints may scale, shear and mirror. Many exporters leave a scale in joints.
   scaling = 0,
-  /// Scale and shear are ignored: of each joint only the rotation of its polar decomposition and
-  /// its
+  /// Scale and shear are ignored: of a joint only the rotation of its polar decomposition and its
   /// translation count.
   scaleIgnored = 1,
   /// Joints only rotate and translate. One that does more rotates by an unspecified rotation.

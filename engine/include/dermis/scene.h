@@ -271,7 +271,7 @@ class DERMIS_CORE_API Scene {
   /// What `vulkan::Context::prepare` needs before such an instance is recorded. If both handles are
   /// valid, only for instances with the same method whose mesh has the same minimum and maximum of
   /// influences and whose pose has the same promise: two kernels for most instances. If a handle
-  /// is null, for any mesh or pose: up to nine. Fails with `invalidArgument` if the method is not
+  /// is null, for any mesh or pose: up to ten. Fails with `invalidArgument` if the method is not
   /// valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
 

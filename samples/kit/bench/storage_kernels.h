@@ -21,7 +21,7 @@ class StorageKernels {
 
   Result<render::Owned<VkPipeline>> makePipeline(std::span<const std::uint32_t> spirv) const;
 
-  /// Binds a pipeline and, by a descriptor set of its own, the buffers of the first bindings.
+  /// Binds a pipeline, and the buffers to the bindings from 0 on. Each call takes a descriptor set.
   Result<void> bind(VkCommandBuffer commandBuffer, VkPipeline pipeline,
                     std::span<const vulkan::BufferRange> buffers) const;
 
