@@ -33,11 +33,11 @@ DERMIS_CONSTANT BINDING_COUNT = 8u;
 
 // Uniform texel buffers of variants that read through them. They are views of the ranges that are
 // bound as the storage buffers of tables, meshes and palettes.
-DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;     // 16 bytes per texel
-DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;      // 16 bytes per texel
-DERMIS_CONSTANT BINDING_MESH_WORDS = 10u;      // 4 bytes per texel
-DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 11u;  // 16 bytes per texel
-DERMIS_CONSTANT TEXEL_BINDING_COUNT = 4u;
+DERMIS_CONSTANT BINDING_TABLE_TEXELS = 8u;
+DERMIS_CONSTANT BINDING_MESH_TEXELS = 9u;
+DERMIS_CONSTANT BINDING_PALETTE_TEXELS = 10u;
+DERMIS_CONSTANT TEXEL_BINDING_COUNT = 3u;
+DERMIS_CONSTANT TEXEL_BYTES = 16u;
 
 // Specialization constants.
 DERMIS_CONSTANT CONSTANT_WORKGROUP_SIZE = 0u;

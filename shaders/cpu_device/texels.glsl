@@ -6,12 +6,11 @@
 
 layout(set = 0, binding = BINDING_TABLE_TEXELS) uniform utextureBuffer tableTexels;
 layout(set = 0, binding = BINDING_MESH_TEXELS) uniform utextureBuffer meshTexels;
-layout(set = 0, binding = BINDING_MESH_WORDS) uniform utextureBuffer meshWordTexels;
 layout(set = 0, binding = BINDING_PALETTE_TEXELS) uniform utextureBuffer paletteTexels;
 
 uvec4 tableUnit(uint word) { return texelFetch(tableTexels, int(word / 4u)); }
 uvec4 meshUnit(uint unit) { return texelFetch(meshTexels, int(unit)); }
-uint meshWord(uint word) { return texelFetch(meshWordTexels, int(word)).x; }
+uint meshWord(uint word) { return meshUnit(word / 4u)[word % 4u]; }
 uvec4 paletteBits(uint unit) { return texelFetch(paletteTexels, int(unit)); }
 
 #endif

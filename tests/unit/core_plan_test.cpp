@@ -370,7 +370,7 @@ bool samePlan(const Plan& a, const Plan& b) {
            x.isAfterBarrier == y.isAfterBarrier &&
            std::ranges::equal(x.bindings, y.bindings,
                               [](const Binding& v, const Binding& w) -> bool {
-                                return v.slot == w.slot && v.texelSize == w.texelSize &&
+                                return v.slot == w.slot && v.isTexelBuffer == w.isTexelBuffer &&
                                        v.part.buffer == w.part.buffer &&
                                        v.part.offset == w.part.offset && v.part.size == w.part.size;
                               });

@@ -43,7 +43,7 @@ struct DeviceLimits {
   /// batch with `Method::linear` poses, through uniform texel buffers, and store an attribute, or
   /// all of a vertex, at once; both are faster on lavapipe. Requires the features `shaderInt64` and
   /// `scalarBlockLayout`, and that a uniform texel buffer of 4-byte texels can hold a whole storage
-  /// buffer range: `maxStorageBufferRange` is at most 4 × maxTexelBufferElements.
+  /// buffer range: `maxStorageBufferRange` is at most 16 × maxTexelBufferElements.
   bool texelBuffers = false;
   /// Whether kernels store interleaved vertices 16 or 8 bytes at a time; where they begin at no
   /// multiple of 8 bytes, through workgroup memory. Needs no device feature. Used only if
@@ -249,9 +249,8 @@ struct BufferPart {
 /// A descriptor of descriptor set 0.
 struct Binding {
   std::uint32_t slot = 0;
-  /// 0 for a storage buffer. For a uniform texel buffer the bytes of a texel: 16
-  /// (VK_FORMAT_R32G32B32A32_UINT) or 4 (VK_FORMAT_R32_UINT).
-  std::uint32_t texelSize = 0;
+  /// A uniform texel buffer (VK_FORMAT_R32G32B32A32_UINT), else a storage buffer.
+  bool isTexelBuffer = false;
   BufferPart part;  ///< at most a storage buffer range
 };
 

@@ -47,42 +47,34 @@ bool isSame(const BufferRange& a, const BufferRange& b) {
 
 // -- Views.
 
-Result<void> createTexelViews(const ContextState& context, BufferRole role, bool isScene,
-                              BoundBuffer& buffer) {
+Result<void> createTexelView(const ContextState& context, BufferRole role, bool isScene,
+                             BoundBuffer& buffer) {
   const bool isRead = role == BufferRole::tables || role == BufferRole::meshes ||
                       role == BufferRole::palettes || (role == BufferRole::poses && !isScene);
-  if (context.texelBindingCount() == 0 || !isRead) return {};
-  const auto create = [&](VkFormat format, std::uint32_t texelSize,
-                          VkBufferView& view) -> Result<void> {
-    const std::uint64_t texels = buffer.range.size / texelSize;
-    if (buffer.range.buffer == VK_NULL_HANDLE || texels == 0) return {};
-    VkBufferViewCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
-    info.buffer = buffer.range.buffer;
-    info.format = format;
-    info.offset = buffer.range.offset;
-    info.range = texels * texelSize;
-    if (const VkResult result =
-            context.table.createBufferView(context.device, &info, context.allocator, &view);
-        result != VK_SUCCESS) {
-      view = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
-      destroyTexelViews(context, buffer);
-      return vulkanError("vkCreateBufferView", result);
-    }
+  const std::uint64_t texels = buffer.range.size / abi::TEXEL_BYTES;
+  if (context.texelBindingCount() == 0 || !isRead || buffer.range.buffer == VK_NULL_HANDLE ||
+      texels == 0)
     return {};
-  };
-  // Unsigned integers, so that no NaN is changed. Every device supports both formats for uniform
-  // texel buffers.
-  Result<void> made = create(VK_FORMAT_R32G32B32A32_UINT, 16, buffer.units);
-  if (made && role == BufferRole::meshes) made = create(VK_FORMAT_R32_UINT, 4, buffer.words);
-  return made;
+  VkBufferViewCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
+  info.buffer = buffer.range.buffer;
+  // Unsigned integers, so that no NaN is changed. Every device supports it for uniform texel
+  // buffers.
+  info.format = VK_FORMAT_R32G32B32A32_UINT;
+  info.offset = buffer.range.offset;
+  info.range = texels * abi::TEXEL_BYTES;
+  if (const VkResult result =
+          context.table.createBufferView(context.device, &info, context.allocator, &buffer.view);
+      result != VK_SUCCESS) {
+    buffer.view = VK_NULL_HANDLE;  // what a failed call leaves there is undefined
+    return vulkanError("vkCreateBufferView", result);
+  }
+  return {};
 }
 
-void destroyTexelViews(const ContextState& context, BoundBuffer& buffer) {
-  for (VkBufferView* view : {&buffer.units, &buffer.words}) {
-    context.table.destroyBufferView(context.device, *view, context.allocator);
-    *view = VK_NULL_HANDLE;
-  }
+void destroyTexelView(const ContextState& context, BoundBuffer& buffer) {
+  context.table.destroyBufferView(context.device, buffer.view, context.allocator);
+  buffer.view = VK_NULL_HANDLE;
 }
 
 // -- Descriptors.
@@ -91,9 +83,8 @@ Descriptors::Descriptors(const ContextState& context, const DispatchCommand& dis
                          const BoundBuffers& bound) {
   for (const Binding& binding : dispatch.bindings) {
     const BoundBuffer& buffer = bound[binding.part.buffer];
-    if (binding.texelSize != 0) {
-      texels[binding.slot - abi::BINDING_COUNT] =
-          binding.texelSize == 16 ? buffer.units : buffer.words;
+    if (binding.isTexelBuffer) {
+      texels[binding.slot - abi::BINDING_COUNT] = buffer.view;
       continue;
     }
     const std::uint64_t size = buffer.range.size - binding.part.offset;
@@ -186,7 +177,7 @@ void DescriptorSets::reset() {
 
 BindingsState::~BindingsState() {
   if (context == nullptr) return;
-  for (BoundBuffer& buffer : bound) destroyTexelViews(*context, buffer);
+  for (BoundBuffer& buffer : bound) destroyTexelView(*context, buffer);
 }
 
 Bindings::Bindings() = default;
@@ -239,7 +230,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
         {BufferRole::previousPositions, &outputs[Stream::previousPositions]}}) {
     BoundBuffer& bound = state.bound[static_cast<std::size_t>(role)];
     bound.range = *range;
-    if (Result<void> made = createTexelViews(*state.context, role, false, bound); !made)
+    if (Result<void> made = createTexelView(*state.context, role, false, bound); !made)
       return made.error();
   }
   return bindings;

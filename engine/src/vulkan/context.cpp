@@ -72,9 +72,9 @@ CpuDeviceFeatures readFeatures(const DeviceDescription& description) {
 }
 
 /// Uses texel buffers if they can hold the storage buffer range that Vulkan guarantees. The range
-/// is then limited to their size: on NVIDIA, texel buffers have 512 MiB and ranges 4 GiB.
+/// is then limited to their size: on NVIDIA, texel buffers have 2 GiB and ranges 4 GiB.
 void chooseTexelBuffers(const VkPhysicalDeviceLimits& device, DeviceLimits& limits) {
-  const std::uint64_t most = std::uint64_t{device.maxTexelBufferElements} * 4;
+  const std::uint64_t most = std::uint64_t{device.maxTexelBufferElements} * abi::TEXEL_BYTES;
   if (limits.maxStorageBuffersPerStage < storageBuffersWanted ||
       most < DeviceLimits().maxStorageBufferRange)
     return;

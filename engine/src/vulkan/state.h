@@ -65,21 +65,20 @@ struct ContextState {
   std::unique_ptr<Pipelines> pipelines;
 };
 
-/// A buffer that commands name, and the views through which kernels read it.
+/// A buffer that commands name, and the view through which kernels for CPU devices read it.
 struct BoundBuffer {
   BufferRange range;
-  VkBufferView units = VK_NULL_HANDLE;  ///< of 16 bytes
-  VkBufferView words = VK_NULL_HANDLE;  ///< of 4 bytes
+  VkBufferView view = VK_NULL_HANDLE;
 };
 
 /// The buffers of a plan, by number.
 using BoundBuffers = std::vector<BoundBuffer>;
 
-/// Creates the views that kernels for CPU devices need of a buffer with this role; none for other
+/// Creates the view that kernels for CPU devices need of a buffer with this role; none for other
 /// devices.
-Result<void> createTexelViews(const ContextState& context, BufferRole role, bool isScene,
-                              BoundBuffer& buffer);
-void destroyTexelViews(const ContextState& context, BoundBuffer& buffer);
+Result<void> createTexelView(const ContextState& context, BufferRole role, bool isScene,
+                             BoundBuffer& buffer);
+void destroyTexelView(const ContextState& context, BoundBuffer& buffer);
 
 /// The descriptors of a dispatch, by binding number.
 struct Descriptors {

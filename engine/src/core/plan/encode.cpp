@@ -505,16 +505,15 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   std::vector<Binding>& bindings = plan_->bindings;
   const std::size_t first = bindings.size();
   for (std::uint32_t slot = 0; slot < count; ++slot) {
-    if (parts[slot].size != 0) bindings.push_back({slot, 0, parts[slot]});
+    if (parts[slot].size != 0) bindings.push_back({slot, false, parts[slot]});
   }
   if (variant.texels) {
-    const auto texels = [&](std::uint32_t slot, std::uint32_t size, const BufferPart& part) {
-      if (part.size >= size) bindings.push_back({slot, size, part});
+    const auto texels = [&](std::uint32_t slot, const BufferPart& part) {
+      if (part.size >= abi::TEXEL_BYTES) bindings.push_back({slot, true, part});
     };
-    texels(abi::BINDING_TABLE_TEXELS, 16, tables);
-    texels(abi::BINDING_MESH_TEXELS, 16, buffers[BufferRole::meshes]);
-    texels(abi::BINDING_MESH_WORDS, 4, buffers[BufferRole::meshes]);
-    texels(abi::BINDING_PALETTE_TEXELS, 16, joints);
+    texels(abi::BINDING_TABLE_TEXELS, tables);
+    texels(abi::BINDING_MESH_TEXELS, buffers[BufferRole::meshes]);
+    texels(abi::BINDING_PALETTE_TEXELS, joints);
   }
   auto& command = std::get<DispatchCommand>(
       plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));

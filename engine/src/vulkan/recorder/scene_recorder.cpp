@@ -103,7 +103,7 @@ SceneRecorder::SceneRecorder(SceneRecorder&&) noexcept = default;
 SceneRecorder& SceneRecorder::operator=(SceneRecorder&&) noexcept = default;
 
 SceneRecorder::State::~State() {
-  for (BoundBuffer& buffer : bound) destroyTexelViews(*context, buffer);
+  for (BoundBuffer& buffer : bound) destroyTexelView(*context, buffer);
 }
 
 Result<SceneRecorder> SceneRecorder::create(const Context& lent,
@@ -243,7 +243,7 @@ Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
     if (wanted.isMapped) mapped = own.bytes().data();
   }
   BoundBuffer buffer{range};
-  if (Result<void> made = createTexelViews(*context, wanted.role, true, buffer); !made)
+  if (Result<void> made = createTexelView(*context, wanted.role, true, buffer); !made)
     return made.error();
   buffers.resize(std::max(buffers.size(), wanted.number + std::size_t{1}));
   bound.resize(buffers.size());
@@ -253,7 +253,7 @@ Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
 }
 
 void SceneRecorder::State::releaseBuffer(std::uint32_t number) {
-  destroyTexelViews(*context, bound[number]);
+  destroyTexelView(*context, bound[number]);
   bound[number] = {};
   buffers[number] = OwnBuffer();
 }
