@@ -160,33 +160,59 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
   }
 }
 
+// Instances that differ in scale, size, morph targets, motion and results are skinned together.
 TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
+  using enum VertexFormat;
   const auto [method, rigidity] = GetParam();
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
   for (const VertexLayout& layout :
-       {plainLayout,
-        layoutOf(VertexFormat::snorm16x3, VertexFormat::octahedral16x2,
-                 VertexFormat::octahedral8x2),
-        layoutOf(VertexFormat::float16x4, VertexFormat::snorm8x4, VertexFormat::float32x4)}) {
+       {plainLayout, layoutOf(snorm16x3, octahedral16x2, octahedral8x2),
+        layoutOf(float16x4, snorm8x4, float32x4), layoutOf(float32x3, float32x3, float32x4),
+        layoutOf(float32x3, float32x3, none, true), layoutOf(float32x4, octahedral16x2, none),
+        layoutOf(float32x3, none, none, false, true)}) {
     Crowd crowd(333, 5, rigidity, layout);
-    crowd.poses[3] = randomPose(5, jointCount, Rigidity::shear);  // one that leaves the plain way
+    std::vector<InstanceResult> results(instanceCount);
+    for (std::size_t i = 1; i < instanceCount; i += 2) crowd.instances[i].result = &results[i];
+    crowd.instances[2].morphs = morphs;
+    crowd.instances[5].restartsMotion = layout.motion;
+    crowd.poses[3] = randomPose(5, jointCount, Rigidity::shear);
+    for (JointMatrix& joint : crowd.poses[4]) {
+      for (auto& row : joint.m) {
+        for (float& entry : row) entry *= 0x1p-20f;  // not moderate
+      }
+    }
     crowd.place();
     crowd.skin(method);
     const std::vector<std::byte> first = crowd.output;
+    const std::vector<InstanceResult> found = results;
+    const auto expectSame = [&](const std::string& what) {
+      EXPECT_TRUE(crowd.output == first) << what;
+      for (std::size_t i = 0; i < instanceCount; ++i) {
+        EXPECT_TRUE(std::ranges::equal(results[i].orderedMin, found[i].orderedMin) &&
+                    std::ranges::equal(results[i].orderedMax, found[i].orderedMax))
+            << what << ", instance " << i;
+        EXPECT_EQ(results[i].clampedVertices, found[i].clampedVertices) << what;
+      }
+    };
     for (const std::string_view target : cpu::targetNames()) {
       ASSERT_TRUE(cpu::setTarget(target).ok());
       crowd.skin(method);
-      EXPECT_TRUE(crowd.output == first) << target;
+      expectSame(std::string(target));
       std::ranges::fill(crowd.output, untouched);
+      std::vector<InstanceResult> all(instanceCount);
       std::uint32_t begin = 0;
-      for (const std::uint32_t end : {13u, 100u, 104u, 250u, 0xffffffffu}) {
+      for (const std::uint32_t end : {13u, 15u, 100u, 104u, 250u, 0xffffffffu}) {
         for (std::size_t i = 0; i < instanceCount; i += 3) {
           cpu::Job job = crowd.job(method, begin, end);
           job.instances = job.instances.subspan(i, std::min<std::size_t>(3, instanceCount - i));
           ASSERT_TRUE(cpu::skin(job).ok());
         }
+        for (std::size_t i = 1; i < instanceCount; i += 2) cpu::addResult(all[i], results[i]);
         begin = end;
       }
-      EXPECT_TRUE(crowd.output == first) << target << ", in ranges";
+      results.swap(all);
+      expectSame(std::string(target) + ", in ranges");
+      results.swap(all);
     }
   }
 }

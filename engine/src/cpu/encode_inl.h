@@ -26,6 +26,13 @@ template <class D>
 DERMIS_INLINE Words<D> halfBits(D d, Vec<D> value) {
   const hn::RebindToUnsigned<D> du;
   const auto set = [&](std::uint32_t word) HWY_ATTR { return hn::Set(du, word); };
+#if HWY_MAX_BYTES >= 32 && !defined(HWY_DISABLE_F16C)
+  // The instruction keeps the lower bits of a NaN.
+  const Vec<D> quiet = hn::CopySign(hn::BitCast(d, set(0x7fc00000)), value);
+  const Vec<D> number = hn::IfThenElse(hn::Eq(value, value), value, quiet);
+  const auto half = hn::DemoteTo(hn::Rebind<hwy::float16_t, D>(), number);
+  return hn::PromoteTo(du, hn::BitCast(hn::Rebind<std::uint16_t, D>(), half));
+#else
   const Words<D> bits = hn::BitCast(du, value);
   const Words<D> magnitude = hn::And(bits, set(0x7fffffff));
   const Words<D> odd = hn::And(hn::ShiftRight<13>(magnitude), set(1));
@@ -40,6 +47,7 @@ DERMIS_INLINE Words<D> halfBits(D d, Vec<D> value) {
       hn::IfThenElse(hn::Gt(magnitude, set(0x7f800000)), set(0x7e00), set(0x7c00));
   const Words<D> sign = hn::And(hn::ShiftRight<16>(bits), set(0x8000));
   return hn::Or(sign, hn::IfThenElse(hn::Gt(magnitude, set(0x477fefff)), special, finite));
+#endif
 }
 
 /// Clamps to [-1, 1]; NaN becomes 0.
@@ -182,50 +190,18 @@ DERMIS_INLINE void bySize(std::uint32_t bytes, const Copy& copy) {
   }
 }
 
-/// Copies an attribute of vertices `first` to `end`; faster if there are exactly `most`.
-template <std::size_t most = 0>
+/// Copies an attribute of vertices `first` to `end`. The addresses are those of vertex 0.
 DERMIS_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byte* from,
                              std::size_t fromStride, std::uint32_t bytes, std::size_t first,
                              std::size_t end) {
   bySize(bytes, [&](auto size) {
-    if constexpr (most != 0) {
-      if (end - first == most) {
-        for (std::size_t lane = 0; lane < most; ++lane)
-          std::memcpy(to + lane * toStride, from + lane * fromStride, size());
-        return;
-      }
+    std::size_t lane = first;
+    // Where the next vertex follows at once, it overwrites what is copied too much.
+    if (size() == 12 && toStride == 12) {
+      for (; lane + 1 < end; ++lane) std::memcpy(to + lane * 12, from + lane * fromStride, 16);
     }
-    for (std::size_t lane = first; lane < end; ++lane)
-      std::memcpy(to + lane * toStride, from + lane * fromStride, size());
+    for (; lane < end; ++lane) std::memcpy(to + lane * toStride, from + lane * fromStride, size());
   });
-}
-
-/// Stores lanes `first` to `end` of an attribute, `stride` bytes apart. `to` is the address of lane
-/// 0, even if lane 0 is not stored.
-template <class D>
-DERMIS_INLINE void storeLanes(D d, const Encoded<D>& value, std::uint32_t bytes, std::byte* to,
-                              std::size_t stride, std::size_t first, std::size_t end) {
-  constexpr std::size_t lanes = hn::MaxLanes(d);
-  const auto word = [&](std::size_t k) HWY_ATTR { return hn::BitCast(d, value.words[k]); };
-  const bool isWhole = end - first == lanes && stride % sizeof(float) == 0 &&
-                       reinterpret_cast<std::uintptr_t>(to) % alignof(float) == 0;
-  if (isWhole && bytes == 16) {
-    storeRows(d, Vec4<D>{word(0), word(1), word(2), word(3)}, reinterpret_cast<float*>(to),
-              stride / sizeof(float));
-    return;
-  }
-  if (isWhole && bytes == 12 && stride == 12) {
-    hn::StoreInterleaved3(word(0), word(1), word(2), d, reinterpret_cast<float*>(to));
-    return;
-  }
-  HWY_ALIGN float words[lanes * 4];
-  if (bytes > 4) {
-    storeRows(d, Vec4<D>{word(0), word(1), word(2), word(3)}, words, 4);
-    copyLanes<lanes>(to, stride, reinterpret_cast<const std::byte*>(words), 16, bytes, first, end);
-  } else {
-    hn::Store(hn::BitCast(d, value.words[0]), d, words);
-    copyLanes<lanes>(to, stride, reinterpret_cast<const std::byte*>(words), 4, bytes, first, end);
-  }
 }
 
 // -- Positions and normals in float32, side by side.
@@ -291,17 +267,6 @@ inline bool areSideBySide(const TaskInstance& instance) {
   return instance.outputs[Stream::normals] == positions + 3 * sizeof(float) &&
          reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
 }
-
-/// Stores one vertex per lane.
-DERMIS_INLINE void storeWhole(Four d, const Vec3<Four>& p, const Vec3<Four>& n, float* to) {
-  storeVertices(d, p, n, &to);
-}
-#if HWY_MAX_BYTES >= 32
-DERMIS_INLINE void storeWhole(Eight d, const Vec3<Eight>& p, const Vec3<Eight>& n, float* to) {
-  float* const halves[2] = {to, to + 4 * vertexFloats};
-  storeVertices(d, p, n, halves);
-}
-#endif
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -94,9 +94,15 @@ DERMIS_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
 /// `v` normalized, whatever its magnitude, or `fallback` if its length is 0.
 template <class D>
 DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
+  const Vec<D> one = hn::Set(d, 1.0f);
+  // Scaling by a power of two changes no bit of the result if no square overflows or underflows.
+  const Vec<D> given = dot3(v, v);
+  if (HWY_LIKELY(hn::AllTrue(
+          d, hn::And(hn::Ge(given, hn::Set(d, 0x1p-60f)), hn::Le(given, hn::Set(d, 0x1p60f))))))
+    return scale3(v, hn::Div(one, hn::Sqrt(given)));
   const Vec3<D> scaled = scale3(v, powerScale(d, largest3(v)));
   const Vec<D> square = dot3(scaled, scaled);
-  const Vec<D> inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square));
+  const Vec<D> inverse = hn::Div(one, hn::Sqrt(square));
   return choose3(hn::Eq(square, hn::Zero(d)), fallback, scale3(scaled, inverse));
 }
 
