@@ -72,7 +72,13 @@ template <bool isLone, class D>
 inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& palette,
                                   const TaskInstance* const* instances) {
   constexpr std::size_t count = isLone ? 1 : blocksOf<D>;
-  const Company company{part.task, instances, count, palette};
+  std::vector<abi::MorphRecord>& targets = part.scratch[0].targets;
+  targets.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const MorphWeight& morph : instances[i]->morphs)
+      targets.push_back(morphTarget(*part.task.mesh, morph.target));
+  }
+  const Company company{part.task, instances, count, palette, targets.data()};
   Findings<D> findings(d);
   Tile<D> tile;
   forTiles(part, isLone ? Tile<D>::most : Tile<D>::most / 2,

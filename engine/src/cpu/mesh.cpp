@@ -241,7 +241,11 @@ MeshData MeshData::select(std::span<const std::uint32_t> vertices,
     const std::uint32_t vertex = vertices[i], block = vertex / blockVertices;
     Lanes displaced[3];
     std::copy_n(positions.data() + std::size_t{block} * 3, 3, displaced);
-    morphBlock(*this, block, morphs, displaced, nullptr, nullptr);
+    for (const MorphWeight& morph : morphs) {
+      const abi::MorphRecord target = morphTarget(*this, morph.target);
+      displace(displacementsOf(*this, target, block), target.attributes, morph.weight, displaced,
+               nullptr, nullptr);
+    }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       selected.positions[i / blockVertices * 3 + axis].v[i % blockVertices] =
           displaced[axis].v[vertex % blockVertices];

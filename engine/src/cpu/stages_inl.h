@@ -9,7 +9,9 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <type_traits>
+#include <utility>
 
 #include "cpu/encode_inl.h"
 #include "cpu/morph.h"
@@ -19,6 +21,11 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
+
+/// The vertices of a block in bind pose.
+struct MorphedBlock {
+  Lanes positions[3], normals[3], tangents[4];
+};
 
 /// Vertices of the instances, in units: a vector for each component. A unit has four vertices of
 /// each instance, or as many of a lone one as there are lanes.
@@ -31,6 +38,7 @@ struct Tile {
   Vec<D> slots[most][12];
   Vec<D> positions[most][3], normals[most][3], tangents[most][4];  ///< in bind pose, if morphed
   Vec<D> givenNormals[most][3], givenTangents[most][4];
+  MorphedBlock blocks[most];  ///< of one instance
 };
 
 // -- Sums over influences.
@@ -220,14 +228,79 @@ inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block,
   return from;
 }
 
-/// Morphs the blocks of a tile for instances that have active targets.
+/// Adds the displacements of a target to all vertices of a block. `components`: positions, then
+/// normals and tangents if the target displaces them; null if not wanted.
+inline HWY_ATTR void displaceAll(const Displacements& displacements, float weight,
+                                 Lanes* const* components) {
+  const Wide d;
+  const Vec<Wide> w = hn::Set(d, weight);
+  const std::size_t size = displacements.size;
+  for (std::size_t lane = 0; lane < blockVertices; lane += hn::MaxLanes(d)) {
+    const auto* const from = reinterpret_cast<const float*>(displacements.words) + lane * size;
+    const auto add = [&](std::size_t component, Vec<Wide> value) HWY_ATTR {
+      if (components[component] == nullptr) return;
+      float* const to = components[component]->v + lane;
+      hn::Store(hn::Add(hn::Load(d, to), hn::Mul(w, value)), d, to);
+    };
+    if (size == 3) {
+      Vec<Wide> x, y, z;
+      hn::LoadInterleaved3(d, from, x, y, z);
+      add(0, x);
+      add(1, y);
+      add(2, z);
+      continue;
+    }
+    // Four components at a time. The last four may begin with some that were added before.
+    for (std::size_t done = 0; done < size;) {
+      const std::size_t first = std::min(done, size - 4);
+      const Vec4<Wide> rows = loadRows(d, from + first, size);
+      const Vec<Wide> four[4] = {rows.x, rows.y, rows.z, rows.w};
+      for (; done < first + 4; ++done) add(done, four[done - first]);
+    }
+  }
+}
+
+inline HWY_ATTR void morphBlocks(const MeshData& mesh, std::uint32_t firstBlock,
+                                 std::uint32_t blockEnd, std::span<const MorphWeight> morphs,
+                                 const abi::MorphRecord* targets, MorphedBlock* blocks) {
+  Lanes* const noLanes = nullptr;
+  for (std::size_t i = 0; i < morphs.size(); ++i) {
+    const abi::MorphRecord& target = targets[i];
+    const float weight = morphs[i].weight;
+    const std::uint32_t first = firstBlock * blockVertices / abi::MORPH_BLOCK_VERTICES;
+    const std::uint32_t last = (blockEnd * blockVertices - 1) / abi::MORPH_BLOCK_VERTICES;
+    if (weight == 0 || last < target.firstBlock || first >= target.firstBlock + target.blockCount)
+      continue;
+    for (std::uint32_t number = firstBlock; number < blockEnd; ++number) {
+      const Displacements found = displacementsOf(mesh, target, number);
+      if (found.mask == 0) continue;
+      MorphedBlock& block = blocks[number - firstBlock];
+      Lanes* const normals = mesh.normals.empty() ? noLanes : block.normals;
+      Lanes* const tangents = mesh.tangents.empty() ? noLanes : block.tangents;
+      if (found.mask != 0xff) {
+        displace(found, target.attributes, weight, block.positions, normals, tangents);
+        continue;
+      }
+      Lanes* components[9];
+      std::size_t count = 0;
+      for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, block.positions},
+                                             {abi::MORPH_HAS_NORMALS, normals},
+                                             {abi::MORPH_HAS_TANGENTS, tangents}}) {
+        if ((target.attributes & attribute) == 0) continue;
+        for (std::size_t k = 0; k < 3; ++k)
+          components[count++] = lanes == nullptr ? nullptr : lanes + k;
+      }
+      displaceAll(found, weight, components);
+    }
+  }
+}
+
+/// Morphs the blocks of a tile for instances that have active targets. `targets`: those of the
+/// first instance, then those of the others.
 template <bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t firstBlock,
                                      std::uint32_t blockEnd, const TaskInstance* const* instances,
-                                     Tile<D>& tile, Source& from) {
-  struct {
-    Lanes positions[3], normals[3], tangents[4];
-  } block;
+                                     const abi::MorphRecord* targets, Tile<D>& tile, Source& from) {
   const auto scatter = [&](const Lanes& lanes, std::size_t unit, std::size_t i, Vec<D>* to) {
     // The memory of a vector is its lanes, in order.
     auto* const memory = reinterpret_cast<std::byte*>(to);
@@ -237,28 +310,32 @@ HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t fi
       std::memcpy(memory + i * 16, lanes.v + unit % 2 * 4, 16);
     }
   };
-  const std::size_t unitsEach = isLone ? 1 : 2;
-  const std::size_t units = (blockEnd - firstBlock) * unitsEach;
+  constexpr std::size_t unitsEach = isLone ? 1 : 2;
+  const std::size_t units =
+      std::min<std::size_t>((blockEnd - firstBlock) * unitsEach, Tile<D>::most);
   const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
   for (std::size_t i = 0; i < (isLone ? 1 : blocksOf<D>); ++i) {
-    for (std::uint32_t number = firstBlock; number < blockEnd; ++number) {
-      std::copy_n(mesh.positions.data() + std::size_t{number} * 3, 3, block.positions);
-      if (normals)
-        std::copy_n(mesh.givenNormals.data() + std::size_t{number} * 3, 3, block.normals);
-      if (tangents)
-        std::copy_n(mesh.givenTangents.data() + std::size_t{number} * 4, 4, block.tangents);
-      morphBlock(mesh, number, instances[i]->morphs, block.positions, block.normals,
-                 block.tangents);
-      for (std::size_t k = 0; k < unitsEach; ++k) {
-        const std::size_t unit = (number - firstBlock) * unitsEach + k;
-        for (std::size_t c = 0; c < 3; ++c) {
-          scatter(block.positions[c], unit, i, &tile.positions[unit][c]);
-          if (normals) scatter(block.normals[c], unit, i, &tile.givenNormals[unit][c]);
-          if (tangents) scatter(block.tangents[c], unit, i, &tile.givenTangents[unit][c]);
-        }
-        if (tangents)
-          scatter(mesh.tangents[std::size_t{number} * 4 + 3], unit, i, &tile.tangents[unit][3]);
+    for (std::size_t k = 0; k < units / unitsEach; ++k) {
+      MorphedBlock& block = tile.blocks[k];
+      const std::size_t number = firstBlock + k;
+      std::copy_n(mesh.positions.data() + number * 3, 3, block.positions);
+      if (normals) std::copy_n(mesh.givenNormals.data() + number * 3, 3, block.normals);
+      if (tangents) {
+        std::copy_n(mesh.givenTangents.data() + number * 4, 3, block.tangents);
+        block.tangents[3] = mesh.tangents[number * 4 + 3];
       }
+    }
+    const std::span<const MorphWeight> morphs = instances[i]->morphs;
+    morphBlocks(mesh, firstBlock, blockEnd, morphs, targets, tile.blocks);
+    targets += morphs.size();
+    for (std::size_t unit = 0; unit < units; ++unit) {
+      const MorphedBlock& block = tile.blocks[unit / unitsEach];
+      for (std::size_t c = 0; c < 3; ++c) {
+        scatter(block.positions[c], unit, i, &tile.positions[unit][c]);
+        if (normals) scatter(block.normals[c], unit, i, &tile.givenNormals[unit][c]);
+        if (tangents) scatter(block.tangents[c], unit, i, &tile.givenTangents[unit][c]);
+      }
+      if (tangents) scatter(block.tangents[3], unit, i, &tile.tangents[unit][3]);
     }
   }
   const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
@@ -796,6 +873,7 @@ struct Company {
   const TaskInstance* const* instances;
   std::size_t count;
   const Palette& palette;
+  const abi::MorphRecord* targets;  ///< the active ones of all instances, one after the other
   Records records = recordsOf(task.places, instances, count);
   bool isMorphed = !instances[0]->morphs.empty();
   bool hasResults = std::any_of(instances, instances + count, [](const TaskInstance* instance) {
@@ -830,7 +908,7 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
 
   Source from = sourceOf(mesh, method, blocks.first, isLone);
   if (company.isMorphed)
-    morphTile<isLone>(d, mesh, blocks.first, blocks.end, instances, tile, from);
+    morphTile<isLone>(d, mesh, blocks.first, blocks.end, instances, company.targets, tile, from);
   const VertexPlaces& places = task.places;
   const bool normals = places[Stream::normals].format != VertexFormat::none;
   const bool tangents = places[Stream::tangents].format != VertexFormat::none;

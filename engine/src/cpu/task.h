@@ -24,6 +24,7 @@ struct Scratch {
   std::vector<CacheLine> rows;             ///< of joints: 3×4, and four zeros
   std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
+  std::vector<abi::MorphRecord> targets;   ///< the active ones of each instance
 };
 
 /// Counterpart of `Instance`.
