@@ -65,6 +65,7 @@ struct Crowd {
       : layout(wanted), source(randomMesh(influences, vertexCount, jointCount, influences)) {
     samples::addTangents(source, 3);
     samples::addMorphs(source, 5, 3);
+    addDenseMorphs();
     mesh.emplace(cpu::Mesh::create(pack(source.view(), jointCount).value()).value());
     places = placeVertices(layout, vertexCount).value();
     output.assign(places.size * instanceCount, untouched);
@@ -78,6 +79,22 @@ struct Crowd {
     place();
   }
 
+  /// Targets 3 to 5 displace every vertex: positions, then also normals, then also tangents.
+  /// Target 6 displaces vertices from 64 on, which is where the second block of masks begins.
+  void addDenseMorphs() {
+    for (std::size_t attributes = 1; attributes <= 4; ++attributes) {
+      samples::OwnedMorph& morph = source.morphs.emplace_back();
+      const bool isLate = attributes == 4;
+      for (std::uint32_t vertex = isLate ? 64 : 0; vertex < source.vertexCount(); ++vertex) {
+        if (isLate) morph.vertices.push_back(vertex);
+        const float value = 0.001f * static_cast<float>(vertex % 50);
+        const float all[3] = {value, 0.02f - value, 0.01f * static_cast<float>(attributes)};
+        morph.positions.insert(morph.positions.end(), all, all + 3);
+        if (attributes >= 2) morph.normals.insert(morph.normals.end(), all, all + 3);
+        if (attributes == 3) morph.tangents.insert(morph.tangents.end(), all, all + 3);
+      }
+    }
+  }
   void place() {
     for (std::size_t i = 0; i < instances.size(); ++i) {
       instances[i].pose = poses[i];
@@ -130,7 +147,8 @@ class CpuMethodTest : public CpuSkinTest,
 // With every format, and as many influences as have a way of their own.
 TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
   const auto [method, rigidity] = GetParam();
-  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1},   {3, 0.3f},
+                                        {4, -1},   {5, 0.7f}, {6, 1.5f}};
   std::vector<VertexLayout> layouts{plainLayout};
   for (const VertexFormat format : allVertexFormats) {
     layouts.push_back(layoutOf(isPositionFormat(format) ? format : VertexFormat::float32x3,
@@ -164,7 +182,8 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
 TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
   using enum VertexFormat;
   const auto [method, rigidity] = GetParam();
-  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1},   {3, 0.3f},
+                                        {4, -1},   {5, 0.7f}, {6, 1.5f}};
   for (const VertexLayout& layout :
        {plainLayout, layoutOf(snorm16x3, octahedral16x2, octahedral8x2),
         layoutOf(float16x4, snorm8x4, float32x4), layoutOf(float32x3, float32x3, float32x4),
@@ -603,7 +622,8 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
 
 // With every method, scaling joints and morph targets.
 TEST_F(CpuSkinTest, SomeVerticesAreWhereTheyAreInTheWhole) {
-  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1}};
+  const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1},   {3, 0.3f},
+                                        {4, -1},   {5, 0.7f}, {6, 1.5f}};
   const std::vector<std::uint32_t> vertices{200, 3, 4, 4, 150, 77, 0, 9, 101, 202};
   for (const auto& [rigidity, promise] : {std::pair(Rigidity::rigid, JointPromise::scaling),
                                           std::pair(Rigidity::shear, JointPromise::scaling),
@@ -679,7 +699,7 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
     job.instances = instances;
     expectRefused(job, "instance 2" + text);
   };
-  const MorphWeight unknown{7, 1};
+  const MorphWeight unknown{9, 1};
   const std::array<MorphWeight, 2> falling{{{2, 1}, {1, 1}}};
   expectBadInstance([](cpu::Instance& i) { i.output = {}; }, " has no output for its positions");
   expectBadInstance([](cpu::Instance& i) { i.pose = i.pose.first(3); }, ": its pose has 3 joints");

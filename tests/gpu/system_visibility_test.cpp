@@ -208,6 +208,45 @@ TEST_F(SystemVisibilityTest, UpdateIntervalsHoldForWhatTheGpuSees) {
     EXPECT_EQ(updates[i], i < visible ? 2u : 0u) << i;
 }
 
+// Between its turns, an instance that appears shows the pose of its last turn, if it was visible
+// then; otherwise its output is older, and it is skinned at once.
+TEST_F(SystemVisibilityTest, WhatAppearsBetweenItsTurnsShowsThePoseOfTheLastOrOfThisFrame) {
+  constexpr std::uint32_t interval = 4;
+  instance_.updateInterval = interval;
+  open(true, plainLayout());
+  submit();
+  engine_->begin();
+  const auto poseOf = [&](std::span<const std::byte> bytes, std::uint32_t i) -> std::uint32_t {
+    const std::vector<std::byte> positions = engine_->read(bytes, instances_[i])[positionStream];
+    for (std::uint32_t frame = 0; frame < 2 * interval; ++frame) {
+      if (positions == positionsIn(i + frame * 100)) return frame;
+    }
+    ADD_FAILURE() << "instance " << i << " shows no pose";
+    return 0;
+  };
+  const auto frame = [&](std::uint32_t number, bool visible) {
+    show(0, visible ? instanceCount : 0);
+    if (number != 1) engine_->begin();
+    moveAll(number * 100);
+    submit();
+  };
+  for (std::uint32_t number = 1; number <= interval; ++number) frame(number, true);
+  std::vector<std::uint32_t> turns;  // of the first four frames
+  std::vector<std::byte> bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) turns.push_back(poseOf(bytes, i));
+  for (std::uint32_t turn = 1; turn <= interval; ++turn)
+    EXPECT_NE(std::ranges::count(turns, turn), 0) << "they take turns";
+  frame(5, true);
+  frame(6, false);
+  frame(7, true);
+  bytes = engine_->readOutput();
+  for (std::uint32_t i = 0; i < instanceCount; ++i) {
+    // Turn 2 came again in frame 6, when nothing was visible, and turn 3 in this frame.
+    const std::uint32_t expected[] = {0, 5, 7, 7, 4};
+    EXPECT_EQ(poseOf(bytes, i), expected[turns[i]]) << "instance " << i << ", turn " << turns[i];
+  }
+}
+
 TEST_F(SystemVisibilityTest, SomeAreCulledOnTheGpuAndSomeAreNot) {
   open(true, motionLayout());
   InstanceDescription other = instance_;

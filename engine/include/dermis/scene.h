@@ -98,9 +98,9 @@ struct InstanceDescription {
   /// The instance is skinned every N-th frame; N is at least 1. If it was due in a frame that was
   /// abandoned, or whose number was skipped, it is skinned in the next one. Instances with the same
   /// pose and interval are skinned in the same frames. Different poses are spread over the frames.
-  /// A teleport, another mesh and becoming visible take effect at once; but the CPU does not know
-  /// that the GPU found an instance visible, so with `culledOnGpu` it may then show the pose of
-  /// the last frame in which it was due.
+  /// A teleport, another mesh and becoming visible take effect at once. But an instance that the
+  /// GPU finds visible between its turns (`culledOnGpu`) shows the pose of its last turn if it was
+  /// visible then, otherwise that of this frame.
   std::uint32_t updateInterval = 1;
   /// Whether a word of the visibility buffer, too, decides in each frame if the instance is
   /// visible: 0 means invisible. `InstanceChange::visible` must be true as well. An invisible
