@@ -351,31 +351,35 @@ TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
   Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
   std::vector<InstanceResult> results(instanceCount),
       parts(instanceCount, {{0, 0, 0}, {~0u, ~0u, ~0u}, 9});
+  const auto expectBounds = [&](const InstanceResult& result, std::size_t i, std::uint32_t begin,
+                                std::uint32_t end) {
+    const Box found = result.box().value();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float least = 1e9f, greatest = -1e9f;
+      for (std::uint32_t vertex = begin; vertex < end; ++vertex) {
+        float p[3];
+        std::memcpy(p, crowd.output.data() + crowd.places.size * i + std::size_t{vertex} * 24, 12);
+        least = std::min(least, p[axis]);
+        greatest = std::max(greatest, p[axis]);
+      }
+      EXPECT_EQ(found.min[axis], least) << begin;
+      EXPECT_EQ(found.max[axis], greatest) << begin;
+    }
+  };
   for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &results[i];
   crowd.skin(Method::dualQuaternion);
-  for (std::size_t i = 0; i < instanceCount; ++i) {
-    float least[3], greatest[3];
-    for (std::uint32_t vertex = 0; vertex < 203; ++vertex) {
-      float p[3];
-      std::memcpy(p, crowd.output.data() + crowd.places.size * i + std::size_t{vertex} * 24, 12);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        least[axis] = vertex == 0 ? p[axis] : std::min(least[axis], p[axis]);
-        greatest[axis] = vertex == 0 ? p[axis] : std::max(greatest[axis], p[axis]);
-      }
-    }
-    const Box found = results[i].box().value();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      EXPECT_EQ(found.min[axis], least[axis]);
-      EXPECT_EQ(found.max[axis], greatest[axis]);
-    }
-  }
+  for (std::size_t i = 0; i < instanceCount; ++i) expectBounds(results[i], i, 0, 203);
   // By parts; what the results were before does not matter.
   std::vector<InstanceResult> sums(instanceCount);
   for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &parts[i];
-  for (const std::uint32_t begin : {0u, 77u}) {
-    const std::uint32_t end = begin == 0 ? 77 : 203;
+  std::uint32_t begin = 0;
+  for (const std::uint32_t end : {77u, 79u, 203u}) {
     ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
-    for (std::size_t i = 0; i < instanceCount; ++i) cpu::addResult(sums[i], parts[i]);
+    for (std::size_t i = 0; i < instanceCount; ++i) {
+      expectBounds(parts[i], i, begin, end);
+      cpu::addResult(sums[i], parts[i]);
+    }
+    begin = end;
   }
   EXPECT_EQ(std::memcmp(sums.data(), results.data(), sizeof(InstanceResult) * instanceCount), 0);
 }

@@ -511,7 +511,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
       turned.tangent = {to[8], to[9], to[10]};
     }
     const Vec<D> share = loadComponent<isLone>(d, from.shares, 1, 0, unit);
-    const Vertex<D> straight = throughMatrix(d, matrixOf<D>(tile.rows[unit]), bind, wanted, false);
+    const Vertex<D> straight = throughMatrix(d, matrixOf<D>(tile.rows[unit]), bind, wanted, isModerate);
     const Vertex<D> mixed = mixVertices(d, straight, turned, share, wanted);
     setThree(to, mixed.position);
     if (normals) setThree(to + 4, mixed.normal);
