@@ -43,8 +43,13 @@ Measured bench(std::vector<std::string> arguments) {
 
 std::vector<std::string> cpuRows() {
   const std::string most = std::to_string(std::max(std::thread::hardware_concurrency(), 1u));
-  return {"cpu/dual_quaternion/1", "cpu/linear/1", "cpu/dual_quaternion/" + most,
-          "cpu/linear/" + most};
+  std::vector<std::string> rows;
+  for (const std::string& threads : {std::string("1"), most}) {
+    rows.push_back("cpu/linear/" + threads);
+    for (const char* const what : {"", "/tangents", "/float16x4+octahedral16x2", "/scales"})
+      rows.push_back("cpu/dual_quaternion/" + threads + what);
+  }
+  return rows;
 }
 
 /// The numbers of a row of `bench --on-paper`: bytes written, bytes stored, bytes read of the mesh

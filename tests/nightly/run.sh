@@ -208,7 +208,9 @@ check_speed() { # JSON PLAIN LINEAR COMPACT
   gpu=gpu/dual_quaternion/float32x3
   ./tests/bench/check_ratios.sh "$1" $gpu gpu/plain/dual_quaternion "$2" gpu/linear/float32x3 gpu/plain/linear "$3" \
     gpu/dual_quaternion/float16x4+octahedral16x2 $gpu "$4" $gpu/bounds $gpu 0.35 $gpu/previous_positions $gpu 0.35 \
-    $gpu/10_instances $gpu 0.5 cpu/dual_quaternion/1 gpu/plain/dual_quaternion 2.5 cpu/linear/1 gpu/plain/linear 2.5
+    $gpu/10_instances $gpu 0.5 cpu/dual_quaternion/1 gpu/plain/dual_quaternion 2.5 cpu/linear/1 gpu/plain/linear 2.5 \
+    cpu/dual_quaternion/1/tangents cpu/dual_quaternion/1 0.3 cpu/dual_quaternion/1/scales cpu/dual_quaternion/1 0.3 \
+    cpu/dual_quaternion/1/float16x4+octahedral16x2 cpu/dual_quaternion/1 0.4
 }
 
 part_speed() {

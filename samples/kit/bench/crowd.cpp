@@ -67,7 +67,11 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
   mesh.positions = view(&first.position, ComponentType::float32, 3);
   mesh.normals = view(&first.normal, ComponentType::float32, 3);
-  // The positions of the centers do not affect the time of methods that read them.
+  // What tangents and centers are does not affect the time of what reads them.
+  std::vector<std::array<float, 4>> tangents;
+  for (const PlainVertex& vertex : vertices)
+    tangents.push_back({vertex.normal[1], vertex.normal[2], vertex.normal[0], 1});
+  mesh.tangents = floatAttribute(tangents[0].data(), mesh.vertexCount, 4);
   mesh.centersOfRotation = mesh.positions;
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);

@@ -154,20 +154,44 @@ struct alignas(64) CacheLine {
   std::byte bytes[64];
 };
 
+struct CpuCase {
+  const char* name = "";  ///< what follows the method and the number of threads
+  Method method = Method::dualQuaternion;
+  VertexLayout layout = {.normals = VertexFormat::float32x3};
+  bool scales = false;
+  /// The instances are divided by it, so that all cases need about the same memory.
+  std::uint32_t share = 1;
+};
+
+std::vector<CpuCase> cpuCases() {
+  using enum VertexFormat;
+  const VertexLayout tangents{.normals = float32x3, .tangents = float32x4};
+  const VertexLayout compact{.positions = float16x4, .normals = octahedral16x2};
+  return {{},
+          {.method = Method::linear},
+          {.name = "/tangents", .layout = tangents, .share = 2},
+          {.name = "/float16x4+octahedral16x2", .layout = compact},
+          {.name = "/scales", .scales = true}};
+}
+
 class CpuCrowd {
  public:
   static Result<CpuCrowd> create(const Crowd& crowd) {
     Result<cpu::Mesh> mesh = cpu::Mesh::create(*crowd.mesh);
     if (!mesh) return mesh.error();
-    const VertexLayout layout{.normals = VertexFormat::float32x3};
-    const Result<VertexPlaces> places = placeVertices(layout, crowd.vertexCount());
-    if (!places) return places.error();
-    return CpuCrowd(crowd, std::move(*mesh), *places);
+    return CpuCrowd(crowd, std::move(*mesh));
+  }
+  std::uint32_t instancesOf(const CpuCase& one) const {
+    return std::max(crowd_->instanceCount() / one.share, 1u);
   }
 
   /// Each thread skins the same number of instances. Returns seconds.
-  Result<double> skin(Method method, std::uint32_t threads) {
-    const std::uint32_t count = crowd_->instanceCount();
+  Result<double> skin(const CpuCase& one, std::uint32_t threads) {
+    const Result<VertexPlaces> places = placeVertices(one.layout, crowd_->vertexCount());
+    if (!places) return places.error();
+    const std::uint32_t count = instancesOf(one);
+    const auto lines = static_cast<std::size_t>(places->size * count / sizeof(CacheLine) + 1);
+    if (output_.size() < lines) output_.resize(lines);
     std::vector<Result<void>> done(threads);
     const auto begin = std::chrono::steady_clock::now();
     {
@@ -175,8 +199,8 @@ class CpuCrowd {
       for (std::uint32_t thread = 0; thread < threads; ++thread) {
         const auto first = static_cast<std::uint32_t>(std::uint64_t{count} * thread / threads);
         const auto end = static_cast<std::uint32_t>(std::uint64_t{count} * (thread + 1) / threads);
-        const auto work = [this, &done, thread, method, first, end] {
-          done[thread] = skinSome(method, first, end);
+        const auto work = [this, &done, &one, &places, thread, first, end] {
+          done[thread] = skinSome(one, *places, first, end);
         };
         if (thread + 1 < threads) {
           workers.start(work);
@@ -192,26 +216,30 @@ class CpuCrowd {
   }
 
  private:
-  CpuCrowd(const Crowd& crowd, cpu::Mesh mesh, const VertexPlaces& places)
-      : crowd_(&crowd),
-        mesh_(std::make_unique<cpu::Mesh>(std::move(mesh))),
-        places_(places),
-        output_(static_cast<std::size_t>(places.size * crowd.instanceCount() / sizeof(CacheLine) +
-                                         1)) {}
+  CpuCrowd(const Crowd& crowd, cpu::Mesh mesh)
+      : crowd_(&crowd), mesh_(std::make_unique<cpu::Mesh>(std::move(mesh))) {
+    for (const std::vector<JointMatrix>& pose : crowd.poses) {
+      std::vector<JointMatrix>& scaled = scaledPoses_.emplace_back(pose);
+      for (JointMatrix& joint : scaled) {
+        for (auto& row : joint.m) row[0] *= 1.25f;
+      }
+    }
+  }
 
-  Result<void> skinSome(Method method, std::uint32_t first, std::uint32_t end) {
+  Result<void> skinSome(const CpuCase& one, const VertexPlaces& places, std::uint32_t first,
+                        std::uint32_t end) {
     std::array<cpu::Instance, instancesOfJob> instances;
     cpu::Job job;
     job.mesh = mesh_.get();
-    job.method = method;
-    job.places = places_;
+    job.method = one.method;
+    job.places = places;
     for (std::uint32_t begin = first; begin < end; begin += instancesOfJob) {
       const std::uint32_t count = std::min(instancesOfJob, end - begin);
       for (std::uint32_t i = 0; i < count; ++i) {
-        instances[i].pose = crowd_->poses[begin + i];
-        instances[i].promise = JointPromise::scaleIgnored;
+        instances[i].pose = (one.scales ? scaledPoses_ : crowd_->poses)[begin + i];
+        instances[i].promise = one.scales ? JointPromise::scaling : JointPromise::scaleIgnored;
         instances[i].output.fill(reinterpret_cast<std::byte*>(output_.data()) +
-                                 places_.size * (begin + i));
+                                 places.size * (begin + i));
       }
       job.instances = std::span(instances).first(count);
       if (Result<void> skinned = cpu::skin(job); !skinned) return skinned;
@@ -221,7 +249,7 @@ class CpuCrowd {
 
   const Crowd* crowd_;
   std::unique_ptr<cpu::Mesh> mesh_;
-  VertexPlaces places_;
+  std::vector<std::vector<JointMatrix>> scaledPoses_;
   std::vector<CacheLine> output_;
 };
 
@@ -233,8 +261,6 @@ std::vector<std::uint32_t> threadCounts() {
   counts.push_back(most);
   return counts;
 }
-
-constexpr std::array cpuMethods{Method::dualQuaternion, Method::linear};
 
 // -- All rows.
 
@@ -343,11 +369,12 @@ class Rows : public Throughput {
     Result<CpuCrowd> made = CpuCrowd::create(crowd);
     if (!made) return made.error();
     cpu_ = std::make_unique<CpuCrowd>(std::move(*made));
-    for (const Method method : cpuMethods) {
+    for (const CpuCase& one : cpuCases()) {
       for (const std::uint32_t threads : threadCounts()) {
-        add("cpu/" + std::string(methodName(method)) + "/" + std::to_string(threads), Section::cpu,
-            crowd.instanceCount(), [this, method, threads] { return cpu_->skin(method, threads); });
-        if (const Result<double> first = cpu_->skin(method, threads); !first) return first.error();
+        add("cpu/" + std::string(methodName(one.method)) + "/" + std::to_string(threads) + one.name,
+            Section::cpu, cpu_->instancesOf(one),
+            [this, one, threads] { return cpu_->skin(one, threads); });
+        if (const Result<double> first = cpu_->skin(one, threads); !first) return first.error();
         step();
       }
     }
@@ -375,7 +402,7 @@ Result<std::unique_ptr<Throughput>> Throughput::create(OpenDevice* open, const C
 std::size_t Throughput::rowCount(const OpenDevice* open, const Crowd& crowd) {
   const std::size_t gpu =
       open == nullptr ? 0 : plainKernelCount + gpuCases(crowd.instanceCount()).size();
-  return gpu + cpuMethods.size() * threadCounts().size();
+  return gpu + cpuCases().size() * threadCounts().size();
 }
 
 }  // namespace dermis::samples

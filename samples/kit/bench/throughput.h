@@ -19,7 +19,8 @@ enum class ThroughputSection : std::uint8_t { baselines, methods, formats, insta
 inline constexpr std::size_t throughputSectionCount = 5;
 
 struct ThroughputRow {
-  std::string name;  ///< gpu/METHOD/FORMATS, gpu/plain/METHOD, gpu/copy, cpu/METHOD/THREADS
+  std::string name;  ///< gpu/METHOD/FORMATS, gpu/plain/METHOD, gpu/copy, cpu/METHOD/THREADS,
+                     ///< cpu/METHOD/THREADS/CASE
   ThroughputSection section = ThroughputSection::methods;
   std::uint32_t instances = 0;
   double bestSeconds = 0;  ///< best of all rounds
