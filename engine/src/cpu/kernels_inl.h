@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <new>
 #include <span>
 
 #include "cpu/kernels.h"
@@ -61,7 +62,7 @@ DERMIS_INLINE void forTiles(const SectionTask& part, std::uint32_t most, const S
           std::min(block + most, (end + blockVertices - 1) / blockVertices);
       const std::uint32_t next = std::min(end, blockEnd * blockVertices);
       skin(Blocks{run, block, blockEnd},
-           Wish{first - block * blockVertices, next - block * blockVertices});
+           VertexRange{first - block * blockVertices, next - block * blockVertices});
       first = next;
     }
   }
@@ -80,10 +81,11 @@ inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& p
   }
   const Company company{part.task, instances, count, palette, targets.data()};
   Findings<D> findings(d);
-  Tile<D> tile;
+  // Not on the stack: an engine's fibers may have little of it.
+  auto& tile = *new (floatsOf(part.scratch[0].tile, sizeof(Tile<D>) / sizeof(float))) Tile<D>;
   forTiles(part, isLone ? Tile<D>::most : Tile<D>::most / 2,
-           [&](const Blocks& blocks, const Wish& wish)
-               HWY_ATTR { skinTile<isLone>(d, company, blocks, wish, tile, findings); });
+           [&](const Blocks& blocks, const VertexRange& range)
+               HWY_ATTR { skinTile<isLone>(d, company, blocks, range, tile, findings); });
   for (std::size_t i = 0; i < count; ++i) {
     if (instances[i]->result == nullptr) continue;
     addFindings(d, findings, i * 4, isLone ? hn::MaxLanes(d) : i * 4 + 4, findings.clamped[i],
@@ -123,8 +125,8 @@ inline HWY_ATTR void skinPlainly(D d, const SectionTask& part, const Palette& pa
     });
   };
   forTiles(part, ~std::uint32_t{0} / blockVertices / 2,
-           [&](const Blocks& blocks, const Wish& wish)
-               HWY_ATTR { skinBlocks<D>(*part.task.mesh, blocks, wish, outputs, skin); });
+           [&](const Blocks& blocks, const VertexRange& range)
+               HWY_ATTR { skinBlocks<D>(*part.task.mesh, blocks, range, outputs, skin); });
 }
 
 #endif  // DERMIS_CPU_GENERAL_ONLY

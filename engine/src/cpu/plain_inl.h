@@ -84,10 +84,10 @@ DERMIS_INLINE void skinInstances(D d, const PlainTask& task, const Palette& pale
   }
 }
 
-/// Calls `skin` for blocks of a run whose vertices are wanted. Whole ones are skinned in place;
-/// others to a temporary buffer, from which the wanted vertices are copied to the output.
+/// Calls `skin` for the blocks of a run. Whole ones are skinned in place. Those of which only some
+/// vertices are in the range are skinned to a temporary buffer, from which these are copied.
 template <class D, class Skin>
-DERMIS_INLINE void skinBlocks(const MeshData& mesh, const Blocks& blocks, const Wish& wish,
+DERMIS_INLINE void skinBlocks(const MeshData& mesh, const Blocks& blocks, const VertexRange& range,
                               float* const* outputs, const Skin& skin) {
   CacheLine buffers[blocksOf<D>][blockFloats * sizeof(float) / sizeof(CacheLine)];
   float* beside[blocksOf<D>];
@@ -99,18 +99,18 @@ DERMIS_INLINE void skinBlocks(const MeshData& mesh, const Blocks& blocks, const 
                   beside[i] + first * vertexFloats, (end - first) * vertexFloats * sizeof(float));
     }
   };
-  const std::size_t whole = (wish.first + blockVertices - 1) / blockVertices;
-  const std::size_t wholeEnd = wish.end / blockVertices;
-  if (wish.first != whole * blockVertices)
-    skinPart(blocks.first, wish.first, std::min<std::size_t>(wish.end, blockVertices));
+  const std::size_t whole = (range.first + blockVertices - 1) / blockVertices;
+  const std::size_t wholeEnd = range.end / blockVertices;
+  if (range.first != whole * blockVertices)
+    skinPart(blocks.first, range.first, std::min<std::size_t>(range.end, blockVertices));
   if (whole < wholeEnd) {
     skin(PlainTask{mesh, blocks.run, blocks.first + static_cast<std::uint32_t>(whole),
                    blocks.first + static_cast<std::uint32_t>(wholeEnd), 0},
          outputs);
   }
-  if (wholeEnd >= whole && wish.end != wholeEnd * blockVertices) {
+  if (wholeEnd >= whole && range.end != wholeEnd * blockVertices) {
     skinPart(blocks.first + static_cast<std::uint32_t>(wholeEnd), 0,
-             wish.end - wholeEnd * blockVertices);
+             range.end - wholeEnd * blockVertices);
   }
 }
 

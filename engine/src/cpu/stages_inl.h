@@ -511,7 +511,8 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
       turned.tangent = {to[8], to[9], to[10]};
     }
     const Vec<D> share = loadComponent<isLone>(d, from.shares, 1, 0, unit);
-    const Vertex<D> straight = throughMatrix(d, matrixOf<D>(tile.rows[unit]), bind, wanted, isModerate);
+    const Vertex<D> straight =
+        throughMatrix(d, matrixOf<D>(tile.rows[unit]), bind, wanted, isModerate);
     const Vertex<D> mixed = mixVertices(d, straight, turned, share, wanted);
     setThree(to, mixed.position);
     if (normals) setThree(to + 4, mixed.normal);
@@ -521,8 +522,8 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
 
 // -- Results.
 
-/// The vertices of a tile that are wanted: `first` to `end`, counted from the tile's first.
-struct Wish {
+/// The vertices of a tile that belong to the job: `first` to `end`, counted from the tile's first.
+struct VertexRange {
   std::size_t first = 0, end = 0;
 };
 
@@ -531,19 +532,19 @@ template <bool isLone, class D>
 inline constexpr std::size_t unitVertices = isLone ? hn::MaxLanes(D()) : 4;
 
 template <bool isLone, class D>
-DERMIS_INLINE bool isWhole(const Wish& wish, std::size_t unit) {
+DERMIS_INLINE bool isWhole(const VertexRange& range, std::size_t unit) {
   const std::size_t first = unit * unitVertices<isLone, D>;
-  return first >= wish.first && first + unitVertices<isLone, D> <= wish.end;
+  return first >= range.first && first + unitVertices<isLone, D> <= range.end;
 }
 
-/// Mask of the lanes whose vertices are wanted.
+/// Mask of the lanes whose vertices are in the range.
 template <bool isLone, class D>
-DERMIS_INLINE hn::Mask<D> wantedLanes(D d, const Wish& wish, std::size_t unit) {
+DERMIS_INLINE hn::Mask<D> lanesInRange(D d, const VertexRange& range, std::size_t unit) {
   constexpr std::size_t lanes = hn::MaxLanes(d);
   HWY_ALIGN float wanted[lanes];
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     const std::size_t vertex = unit * unitVertices<isLone, D> + (isLone ? lane : lane % 4);
-    wanted[lane] = vertex >= wish.first && vertex < wish.end ? 1.0f : 0.0f;
+    wanted[lane] = vertex >= range.first && vertex < range.end ? 1.0f : 0.0f;
   }
   return hn::Ne(hn::Load(d, wanted), hn::Zero(d));
 }
@@ -561,17 +562,17 @@ struct Findings {
 };
 
 template <bool isLone, class D>
-HWY_NOINLINE HWY_ATTR void findBounds(D d, const Tile<D>& tile, std::size_t units, const Wish& wish,
-                                      Findings<D>& findings) {
+HWY_NOINLINE HWY_ATTR void findBounds(D d, const Tile<D>& tile, std::size_t units,
+                                      const VertexRange& range, Findings<D>& findings) {
   for (std::size_t unit = 0; unit < units; ++unit) {
-    const bool whole = isWhole<isLone, D>(wish, unit);
+    const bool whole = isWhole<isLone, D>(range, unit);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       // NaN leaves the bounds unchanged: both comparisons are false.
       const Vec<D> value = tile.slots[unit][axis];
       Vec<D>&least = findings.least[axis], &greatest = findings.greatest[axis];
       auto isLess = hn::Lt(value, least), isGreater = hn::Gt(value, greatest);
       if (!whole) {
-        const auto wanted = wantedLanes<isLone>(d, wish, unit);
+        const auto wanted = lanesInRange<isLone>(d, range, unit);
         isLess = hn::And(wanted, isLess);
         isGreater = hn::And(wanted, isGreater);
       }
@@ -609,7 +610,7 @@ inline HWY_ATTR void addFindings(D d, const Findings<D>& findings, std::size_t f
 /// Maps positions from the boxes of their instances to [-1, 1], and counts those outside.
 template <bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void relateToBoxes(D d, const TaskInstance* const* instances,
-                                         std::size_t units, const Wish& wish, Tile<D>& tile,
+                                         std::size_t units, const VertexRange& range, Tile<D>& tile,
                                          Findings<D>& findings) {
   constexpr std::size_t lanes = hn::MaxLanes(d);
   HWY_ALIGN float centers[3][lanes], inverses[3][lanes], counts[lanes];
@@ -629,7 +630,7 @@ HWY_NOINLINE HWY_ATTR void relateToBoxes(D d, const TaskInstance* const* instanc
       isOutside = hn::Or(isOutside, hn::Gt(hn::Abs(value), hn::Set(d, 1.00001f)));
     }
     if (hn::AllFalse(d, isOutside)) continue;
-    isOutside = hn::And(isOutside, wantedLanes<isLone>(d, wish, unit));
+    isOutside = hn::And(isOutside, lanesInRange<isLone>(d, range, unit));
     hn::Store(hn::IfThenElseZero(isOutside, hn::Set(d, 1.0f)), d, counts);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       if (counts[lane] != 0) ++findings.clamped[isLone ? 0 : lane / 4];
@@ -811,11 +812,11 @@ HWY_NOINLINE HWY_ATTR void storeUsual(D d, std::byte* const* to, std::size_t fir
   }
 }
 
-/// Stores a quad of those vertices of a unit that are wanted.
+/// Stores a quad of those vertices of a unit that are in the range.
 template <bool isLone, class D>
-HWY_NOINLINE HWY_ATTR void storeWanted(D d, const Quad& quad, std::size_t stride,
-                                       std::byte* const* to, std::size_t unit, const Wish& wish,
-                                       const Tile<D>& tile) {
+HWY_NOINLINE HWY_ATTR void storeSome(D d, const Quad& quad, std::size_t stride,
+                                     std::byte* const* to, std::size_t unit,
+                                     const VertexRange& range, const Tile<D>& tile) {
   Vec<D> words[4];
   for (std::size_t k = 0; k < 4; ++k) words[k] = tile.slots[unit][quad.slot[k]];
   transpose4(d, words[0], words[1], words[2], words[3]);
@@ -824,7 +825,7 @@ HWY_NOINLINE HWY_ATTR void storeWanted(D d, const Quad& quad, std::size_t stride
   for (std::size_t i = 0; i < blocksOf<D>; ++i) {
     for (std::size_t vertex = 0; vertex < 4; ++vertex) {
       const std::size_t number = unit * unitVertices<isLone, D> + (isLone ? i * 4 : 0) + vertex;
-      if (number < wish.first || number >= wish.end) continue;
+      if (number < range.first || number >= range.end) continue;
       std::memcpy(to[isLone ? 0 : i] + number * stride + quad.offset, all[vertex] + i * 4,
                   quad.bytes);
     }
@@ -834,18 +835,19 @@ HWY_NOINLINE HWY_ATTR void storeWanted(D d, const Quad& quad, std::size_t stride
 /// Stores the vertices of a tile. `to`: where the first vertex of each instance goes.
 template <bool isLone, class D>
 inline HWY_ATTR void storeRecord(D d, const Record& record, std::size_t stride,
-                                 std::byte* const* to, const Wish& wish, const Tile<D>& tile) {
+                                 std::byte* const* to, const VertexRange& range,
+                                 const Tile<D>& tile) {
   constexpr std::size_t vertices = unitVertices<isLone, D>;
-  const std::size_t whole = (wish.first + vertices - 1) / vertices;
-  const std::size_t wholeEnd = std::max(whole, wish.end / vertices);
+  const std::size_t whole = (range.first + vertices - 1) / vertices;
+  const std::size_t wholeEnd = std::max(whole, range.end / vertices);
   const bool isUsual = isUsualRecord(record, stride, to, isLone ? 1 : blocksOf<D>);
   if (isUsual) storeUsual<isLone>(d, to, whole, wholeEnd, tile);
   for (std::size_t first = 0; first < record.slots; first += 4) {
     Quad quad{{}, std::min<std::size_t>(record.bytes - first * 4, 16), first * 4};
     for (std::size_t k = 0; k < 4; ++k)
       quad.slot[k] = record.slot[std::min<std::size_t>(first + k, record.slots - 1)];
-    if (wish.first != whole * vertices)
-      storeWanted<isLone>(d, quad, stride, to, wish.first / vertices, wish, tile);
+    if (range.first != whole * vertices)
+      storeSome<isLone>(d, quad, stride, to, range.first / vertices, range, tile);
     if (!isUsual)
       bySize(static_cast<std::uint32_t>(quad.bytes), [&](auto size) HWY_ATTR {
         if (size() % 4 == 0 && stride == size()) {
@@ -854,8 +856,8 @@ inline HWY_ATTR void storeRecord(D d, const Record& record, std::size_t stride,
           storeUnits<isLone, size(), false>(d, quad, stride, to, whole, wholeEnd, tile);
         }
       });
-    if (wish.end > wholeEnd * vertices)
-      storeWanted<isLone>(d, quad, stride, to, wholeEnd, wish, tile);
+    if (range.end > wholeEnd * vertices)
+      storeSome<isLone>(d, quad, stride, to, wholeEnd, range, tile);
   }
 }
 
@@ -881,10 +883,10 @@ struct Company {
   });
 };
 
-/// Skins the wanted vertices of a tile.
+/// Skins a tile. Only vertices in the range are stored and count for results.
 template <bool isLone, class D>
-inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks, const Wish& wish,
-                              Tile<D>& tile, Findings<D>& findings) {
+inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
+                              const VertexRange& range, Tile<D>& tile, Findings<D>& findings) {
   const Task& task = company.task;
   const TaskInstance* const* const instances = company.instances;
   const Palette& palette = company.palette;
@@ -901,7 +903,7 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
     for (std::size_t i = 0; i < company.count; ++i) {
       const std::byte* const place =
           instances[i]->outputs[stream] + std::size_t{blocks.first} * blockVertices * stride;
-      for (std::size_t byte = wish.first * stride; byte < wish.end * stride; byte += 64)
+      for (std::size_t byte = range.first * stride; byte < range.end * stride; byte += 64)
         hwy::Prefetch(place + byte);
     }
   }
@@ -950,9 +952,9 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
   }
 
   constexpr std::size_t instanceCount = isLone ? 1 : blocksOf<D>;
-  if (company.hasResults) findBounds<isLone>(d, tile, units, wish, findings);
+  if (company.hasResults) findBounds<isLone>(d, tile, units, range, findings);
   if (isSnormPosition(places[Stream::positions].format))
-    relateToBoxes<isLone>(d, instances, units, wish, tile, findings);
+    relateToBoxes<isLone>(d, instances, units, range, tile, findings);
   encodeUnits<Stream::positions>(d, places[Stream::positions].format, units, tile);
   if (normals) encodeUnits<Stream::normals>(d, places[Stream::normals].format, units, tile);
   if (tangents) encodeUnits<Stream::tangents>(d, places[Stream::tangents].format, units, tile);
@@ -968,7 +970,7 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
       const ByStream<std::byte*>& outputs = instances[i]->outputs;
       copyLanes(outputs[Stream::previousPositions] + vertex * target.stride, target.stride,
                 outputs[Stream::positions] + vertex * source.stride, source.stride,
-                formatSize(source.format), wish.first, wish.end);
+                formatSize(source.format), range.first, range.end);
     }
   };
   copyPositions(false);
@@ -978,7 +980,7 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
     std::byte* to[instanceCount];
     for (std::size_t i = 0; i < instanceCount; ++i)
       to[i] = instances[i]->outputs[record.stream] + vertex * stride;
-    storeRecord<isLone>(d, record, stride, to, wish, tile);
+    storeRecord<isLone>(d, record, stride, to, range, tile);
   }
   copyPositions(true);
 }

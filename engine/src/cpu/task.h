@@ -25,6 +25,7 @@ struct Scratch {
   std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
   std::vector<abi::MorphRecord> targets;   ///< the active ones of each instance
+  std::vector<CacheLine> tile;             ///< what the stages hand to each other
 };
 
 /// Counterpart of `Instance`.
