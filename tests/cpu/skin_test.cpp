@@ -144,7 +144,7 @@ class CpuSkinTest : public ::testing::Test {
 class CpuMethodTest : public CpuSkinTest,
                       public ::testing::WithParamInterface<std::tuple<Method, Rigidity>> {};
 
-// With every format, and as many influences as have a way of their own.
+// With every format and instruction set, and as many influences as have a way of their own.
 TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
   const auto [method, rigidity] = GetParam();
   const std::vector<MorphWeight> morphs{{0, 0.5f}, {2, -1},   {3, 0.3f},
@@ -166,13 +166,16 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
       if (isMorphed) {
         for (cpu::Instance& instance : crowd.instances) instance.morphs = morphs;
       }
-      crowd.skin(method);
-      for (std::size_t i = 0; i < instanceCount; ++i) {
-        const Comparison comparison = crowd.compared(method, i);
-        EXPECT_TRUE(comparison.passed())
-            << "instance " << i << ", vertex " << comparison.firstFailure << ": "
-            << comparison.worstPosition << ", " << comparison.worstNormal << ", "
-            << comparison.worstTangent << " of the bounds";
+      for (const std::string_view target : cpu::targetNames()) {
+        ASSERT_TRUE(cpu::setTarget(target).ok());
+        crowd.skin(method);
+        for (std::size_t i = 0; i < instanceCount; ++i) {
+          const Comparison comparison = crowd.compared(method, i);
+          EXPECT_TRUE(comparison.passed())
+              << target << ", instance " << i << ", vertex " << comparison.firstFailure << ": "
+              << comparison.worstPosition << ", " << comparison.worstNormal << ", "
+              << comparison.worstTangent << " of the bounds";
+        }
       }
     }
   }
