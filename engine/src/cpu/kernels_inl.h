@@ -11,7 +11,7 @@
 #include <span>
 
 #include "cpu/kernels.h"
-#ifndef DERMIS_CPU_GENERAL_ONLY
+#ifndef DERMIS_CPU_STAGES_ONLY
 #include "cpu/plain_inl.h"
 #endif
 #include "cpu/stages_inl.h"
@@ -93,7 +93,7 @@ inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& p
   }
 }
 
-#ifndef DERMIS_CPU_GENERAL_ONLY
+#ifndef DERMIS_CPU_STAGES_ONLY
 
 /// Whether plain_inl.h can skin these instances.
 inline bool isPlain(const Task& task, const TaskInstance* const* instances, std::size_t count) {
@@ -129,7 +129,7 @@ inline HWY_ATTR void skinPlainly(D d, const SectionTask& part, const Palette& pa
                HWY_ATTR { skinBlocks<D>(*part.task.mesh, blocks, range, outputs, skin); });
 }
 
-#endif  // DERMIS_CPU_GENERAL_ONLY
+#endif  // DERMIS_CPU_STAGES_ONLY
 
 template <bool isLone, class D>
 inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Group& group,
@@ -138,7 +138,7 @@ inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Group& gro
   Palette palette = makePalette<isLone>(d, *part.task.mesh, part.section, part.task.method, group,
                                         first, part.scratch[0]);
   palette.isModerate = isModerate;
-#ifndef DERMIS_CPU_GENERAL_ONLY
+#ifndef DERMIS_CPU_STAGES_ONLY
   if constexpr (!isLone) {
     if (isModerate && isPlain(part.task, instances, blocksOf<D>))
       return skinPlainly(d, part, palette, instances);

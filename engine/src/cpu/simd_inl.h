@@ -6,7 +6,7 @@
 #include "hwy/highway.h"
 
 // Where vectors are plain arrays, inlining everything costs a minute of compile time.
-#ifdef DERMIS_CPU_GENERAL_ONLY
+#ifdef DERMIS_CPU_STAGES_ONLY
 #define DERMIS_INLINE inline
 #else
 #define DERMIS_INLINE HWY_INLINE

@@ -54,7 +54,7 @@ struct Slots {
 /// Calls `sum` with the number of influences: a compile-time constant up to 4, or 0 for more.
 template <class Sum>
 DERMIS_INLINE void byInfluences([[maybe_unused]] std::uint32_t influences, const Sum& sum) {
-#ifdef DERMIS_CPU_GENERAL_ONLY
+#ifdef DERMIS_CPU_STAGES_ONLY
   influences = 0;
 #endif
   switch (influences) {
