@@ -156,6 +156,11 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
                                isTangentFormat(format) ? format : VertexFormat::none, false,
                                layouts.size() % 2 == 0));
   }
+  // As many bytes a vertex as positions and normals in float32.
+  layouts.push_back(
+      layoutOf(VertexFormat::float32x3, VertexFormat::octahedral16x2, VertexFormat::float16x4));
+  layouts.push_back(
+      layoutOf(VertexFormat::float32x3, VertexFormat::snorm16x4, VertexFormat::snorm8x4));
   for (std::size_t number = 0; number < layouts.size(); ++number) {
     const auto influences = static_cast<std::uint32_t>(number % 6 + 1);
     SCOPED_TRACE(std::string(formatName(layouts[number].positions)) + ", " +
@@ -191,7 +196,7 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
        {plainLayout, layoutOf(snorm16x3, octahedral16x2, octahedral8x2),
         layoutOf(float16x4, snorm8x4, float32x4), layoutOf(float32x3, float32x3, float32x4),
         layoutOf(float32x3, float32x3, none, true), layoutOf(float32x4, octahedral16x2, none),
-        layoutOf(float32x3, none, none, false, true)}) {
+        layoutOf(float32x3, snorm8x4, float16x4), layoutOf(float32x3, none, none, false, true)}) {
     Crowd crowd(333, 5, rigidity, layout);
     std::vector<InstanceResult> results(instanceCount);
     for (std::size_t i = 1; i < instanceCount; i += 2) crowd.instances[i].result = &results[i];
@@ -244,6 +249,40 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::ValuesIn(everydayMethods),
                        ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                          Rigidity::mirrored, Rigidity::mirroredAlongOneAxis)));
+
+// A direction without length in another lane is normalized in another way.
+TEST_F(CpuSkinTest, ATinyComponentHasTheSameBitsBesideAnyOtherVertex) {
+  OwnedMesh source = randomMesh(1, 8, 1, 1);
+  for (std::size_t vertex = 0; vertex < 8; ++vertex) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      source.normals[vertex * 3 + axis] = axis == 0 && vertex != 5 ? 1.0f : 0.0f;
+  }
+  const cpu::Mesh mesh = cpu::Mesh::create(pack(source.view(), 1).value()).value();
+  const VertexPlaces places = placeVertices(plainLayout, 8).value();
+  JointMatrix pose;
+  pose.m[0][1] = -1.2345e-39f;
+  std::vector<std::byte> first;
+  for (const std::string_view target : cpu::targetNames()) {
+    ASSERT_TRUE(cpu::setTarget(target).ok());
+    for (const std::size_t count : {1u, 2u, 3u, 4u}) {
+      std::vector<std::byte> output(places.size * count);
+      std::vector<cpu::Instance> instances(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        instances[i].pose = {&pose, 1};
+        instances[i].output.fill(output.data() + places.size * i);
+      }
+      ASSERT_TRUE(cpu::skin(jobOf(mesh, Method::linear, places, instances)).ok());
+      if (first.empty()) first.assign(output.begin(), output.begin() + 24);
+      for (std::size_t i = 0; i < count; ++i) {
+        for (const std::size_t vertex : {0u, 1u, 4u, 7u}) {
+          const std::byte* const normal = output.data() + places.size * i + vertex * 24 + 12;
+          EXPECT_EQ(std::memcmp(normal, first.data() + 12, 12), 0)
+              << target << ", " << count << " instances, vertex " << vertex;
+        }
+      }
+    }
+  }
+}
 
 TEST_F(CpuSkinTest, TheInstructionSetsOfThisProcessorAreThere) {
   const std::vector<std::string_view> names = cpu::targetNames();

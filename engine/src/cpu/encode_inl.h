@@ -195,12 +195,8 @@ DERMIS_INLINE void copyLanes(std::byte* to, std::size_t toStride, const std::byt
                              std::size_t fromStride, std::uint32_t bytes, std::size_t first,
                              std::size_t end) {
   bySize(bytes, [&](auto size) {
-    std::size_t lane = first;
-    // Where the next vertex follows at once, it overwrites what is copied too much.
-    if (size() == 12 && toStride == 12) {
-      for (; lane + 1 < end; ++lane) std::memcpy(to + lane * 12, from + lane * fromStride, 16);
-    }
-    for (; lane < end; ++lane) std::memcpy(to + lane * toStride, from + lane * fromStride, size());
+    for (std::size_t lane = first; lane < end; ++lane)
+      std::memcpy(to + lane * toStride, from + lane * fromStride, size());
   });
 }
 

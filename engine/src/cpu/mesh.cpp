@@ -79,9 +79,11 @@ std::vector<Lanes> sharesOf(const Reader& reader, std::uint32_t section, float a
 
 /// Gives the same bits as `unitOr` of the kernels, which normalizes vertices after morphing.
 std::array<float, 3> unitOrZero(float x, float y, float z) {
+  const float given = x * x + y * y + z * z;
+  const bool isModerate = given >= 0x1p-60f && given <= 0x1p60f;
   const float largest = std::max(std::abs(x), std::max(std::abs(y), std::abs(z)));
   const std::uint32_t exponent = std::bit_cast<std::uint32_t>(largest) >> 23;
-  const float scale = std::bit_cast<float>((253 - std::min(exponent, 252u)) << 23);
+  const float scale = isModerate ? 1 : std::bit_cast<float>((253 - std::min(exponent, 252u)) << 23);
   x *= scale;
   y *= scale;
   z *= scale;
@@ -242,6 +244,7 @@ MeshData MeshData::select(std::span<const std::uint32_t> vertices,
     Lanes displaced[3];
     std::copy_n(positions.data() + std::size_t{block} * 3, 3, displaced);
     for (const MorphWeight& morph : morphs) {
+      if (morph.weight == 0) continue;
       const abi::MorphRecord target = morphTarget(*this, morph.target);
       displace(displacementsOf(*this, target, block), target.attributes, morph.weight, displaced,
                nullptr, nullptr);

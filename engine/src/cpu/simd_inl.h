@@ -91,16 +91,17 @@ DERMIS_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
   return hn::BitCast(d, hn::ShiftLeft<23>(scaled));
 }
 
-/// `v` normalized, whatever its magnitude, or `fallback` if its length is 0.
+/// `v` normalized, whatever its magnitude, or `fallback` if its length is 0. A lane is scaled only
+/// if its square needs it, whatever the other lanes need: scaling may round a tiny component.
 template <class D>
 DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
   const Vec<D> one = hn::Set(d, 1.0f);
-  // Scaling by a power of two changes no bit of the result if no square overflows or underflows.
   const Vec<D> given = dot3(v, v);
-  if (HWY_LIKELY(hn::AllTrue(
-          d, hn::And(hn::Ge(given, hn::Set(d, 0x1p-60f)), hn::Le(given, hn::Set(d, 0x1p60f))))))
-    return scale3(v, hn::Div(one, hn::Sqrt(given)));
-  const Vec3<D> scaled = scale3(v, powerScale(d, largest3(v)));
+  const auto isModerate =
+      hn::And(hn::Ge(given, hn::Set(d, 0x1p-60f)), hn::Le(given, hn::Set(d, 0x1p60f)));
+  if (HWY_LIKELY(hn::AllTrue(d, isModerate))) return scale3(v, hn::Div(one, hn::Sqrt(given)));
+  const Vec<D> factor = hn::IfThenElse(isModerate, one, powerScale(d, largest3(v)));
+  const Vec3<D> scaled = scale3(v, factor);
   const Vec<D> square = dot3(scaled, scaled);
   const Vec<D> inverse = hn::Div(one, hn::Sqrt(square));
   return choose3(hn::Eq(square, hn::Zero(d)), fallback, scale3(scaled, inverse));

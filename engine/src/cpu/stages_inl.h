@@ -71,16 +71,19 @@ DERMIS_INLINE void byInfluences([[maybe_unused]] std::uint32_t influences, const
   }
 }
 
-/// Σ w e of one vertex, over as many floats of each entry as there are lanes. An entry has
-/// 8 · `units` floats. If `influences` is 0, `count` is the number of influences.
-template <int influences, class D>
+/// Σ w e of one vertex, over as many floats of each entry as there are lanes, from influence
+/// `begin` on. An entry has 8 · `units` floats. If `influences` is 0, `count` is the number of
+/// influences.
+template <int influences, std::size_t begin, class D>
 DERMIS_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
                                const std::uint16_t* HWY_RESTRICT numbers,
                                const float* HWY_RESTRICT weights, std::size_t count) {
   if (influences != 0) count = influences;
-  Vec<D> sum = hn::Mul(hn::Set(d, weights[0]), hn::Load(d, entries + numbers[0] * units));
-  for (std::size_t i = 1; i < count; ++i)
-    sum = hn::Add(sum, hn::Mul(hn::Set(d, weights[i]), hn::Load(d, entries + numbers[i] * units)));
+  Vec<D> sum = hn::Zero(d);
+  for (std::size_t i = begin; i < count; ++i) {
+    const Vec<D> part = hn::Mul(hn::Set(d, weights[i]), hn::Load(d, entries + numbers[i] * units));
+    sum = i == begin ? part : hn::Add(sum, part);
+  }
   return sum;
 }
 
@@ -155,8 +158,10 @@ HWY_NOINLINE HWY_ATTR void sumUnits(D d, const float* const* quads, const float*
         if constexpr (K >= 2) {
           Vec<D> rows[8];
           for (std::size_t i = 0; i < 8; ++i) {
-            rows[i] = sumVertex<influences()>(d, quads[0], K == 3 ? 2 : 1, number + i * count,
-                                              weight + i * count, count);
+            rows[i] = sumVertex < influences(),
+            hasPivots
+                ? 1
+                : 0 > (d, quads[0], K == 3 ? 2 : 1, number + i * count, weight + i * count, count);
             if (hasPivots) rows[i] = hn::Add(hn::LoadU(d, pivots[0] + joint[i * count]), rows[i]);
           }
           columnsOf(d, rows, own);
@@ -165,8 +170,8 @@ HWY_NOINLINE HWY_ATTR void sumUnits(D d, const float* const* quads, const float*
           const Four four;
           Vec<Four> rows[8];
           for (std::size_t i = 0; i < 8; ++i) {
-            rows[i] = sumVertex<influences()>(four, quads[K - 1], K == 3 ? 2 : 1,
-                                              number + i * count, weight + i * count, count);
+            rows[i] = sumVertex<influences(), 0>(four, quads[K - 1], K == 3 ? 2 : 1,
+                                                 number + i * count, weight + i * count, count);
           }
           Vec<D>* const last = own + (K - 1) * 4;
           for (std::size_t i = 0; i < 4; ++i) last[i] = hn::Combine(d, rows[i + 4], rows[i]);
@@ -790,9 +795,10 @@ HWY_NOINLINE HWY_ATTR void storeUnits(D d, const Quad& quad, std::size_t stride,
 /// Whether a record is positions and normals as float32x3, with nothing else in a vertex.
 inline bool isUsualRecord(const Record& record, std::size_t stride, std::byte* const* to,
                           std::size_t instances) {
-  return record.stream == Stream::positions && record.bytes == vertexFloats * sizeof(float) &&
-         record.slots == 6 && record.slot[2] == 2 && record.slot[3] == 4 &&
-         stride == record.bytes && std::all_of(to, to + instances, [](const std::byte* place) {
+  constexpr std::uint8_t slots[] = {0, 1, 2, 4, 5, 6};
+  return record.slots == std::size(slots) && std::ranges::equal(slots, std::span(record.slot, 6)) &&
+         record.bytes == vertexFloats * sizeof(float) && stride == record.bytes &&
+         std::all_of(to, to + instances, [](const std::byte* place) {
            return reinterpret_cast<std::uintptr_t>(place) % alignof(float) == 0;
          });
 }
@@ -903,7 +909,8 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
     for (std::size_t i = 0; i < company.count; ++i) {
       const std::byte* const place =
           instances[i]->outputs[stream] + std::size_t{blocks.first} * blockVertices * stride;
-      for (std::size_t byte = range.first * stride; byte < range.end * stride; byte += 64)
+      const std::size_t step = std::max<std::size_t>(stride, 64);
+      for (std::size_t byte = range.first * stride; byte < range.end * stride; byte += step)
         hwy::Prefetch(place + byte);
     }
   }
