@@ -1,6 +1,7 @@
 // Encodes attributes in the formats of VertexFormat, by the rules of shaders/encode.glsl.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
@@ -252,16 +253,18 @@ DERMIS_INLINE void storeVertices(D d, const Vec3<D>& p, const Vec3<D>& n, float*
   storeBlocks(d, chunks, to);
 }
 
-inline bool areSideBySide(const VertexPlaces& places) {
-  return places[Stream::positions].format == VertexFormat::float32x3 &&
-         places[Stream::normals].format == VertexFormat::float32x3 &&
-         places[Stream::positions].stride == vertexFloats * sizeof(float) &&
-         places[Stream::normals].stride == places[Stream::positions].stride;
-}
-inline bool areSideBySide(const TaskInstance& instance) {
-  const std::byte* const positions = instance.outputs[Stream::positions];
-  return instance.outputs[Stream::normals] == positions + 3 * sizeof(float) &&
-         reinterpret_cast<std::uintptr_t>(positions) % alignof(float) == 0;
+/// Whether `storeVertices` can store the positions and normals of these instances. Then nothing
+/// else is in a vertex.
+inline bool areSideBySide(const VertexPlaces& places, const TaskInstance* const* instances,
+                          std::size_t count) {
+  const OutputAttribute &positions = places[Stream::positions], &normals = places[Stream::normals];
+  return positions.format == VertexFormat::float32x3 && normals.format == VertexFormat::float32x3 &&
+         positions.stride == vertexFloats * sizeof(float) && normals.stride == positions.stride &&
+         std::all_of(instances, instances + count, [](const TaskInstance* instance) {
+           const std::byte* const position = instance->outputs[Stream::positions];
+           return instance->outputs[Stream::normals] == position + 3 * sizeof(float) &&
+                  reinterpret_cast<std::uintptr_t>(position) % alignof(float) == 0;
+         });
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE

@@ -37,15 +37,6 @@ inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& fi
   end = std::min(part.vertexEnd, run.blockEnd * blockVertices);
 }
 
-/// Copies positions to the previous positions.
-inline void settle(const Task& task, const TaskInstance& instance, std::uint32_t first,
-                   std::uint32_t end) {
-  const OutputAttribute &from = task.places[Stream::positions],
-                        &to = task.places[Stream::previousPositions];
-  copyLanes(instance.outputs[Stream::previousPositions], to.stride,
-            instance.outputs[Stream::positions], from.stride, formatSize(from.format), first, end);
-}
-
 // -- Instances that are skinned together: as many as a vector has blocks, or a lone one.
 
 /// Calls `skin` for the blocks of each run that lie in the job, at most `most` at a time.
@@ -99,10 +90,10 @@ inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& p
 inline bool isPlain(const Task& task, const TaskInstance* const* instances, std::size_t count) {
   if (task.method != Method::dualQuaternion && task.method != Method::linear) return false;
   if (task.places.hasMotion() || task.places[Stream::tangents].format != VertexFormat::none ||
-      !areSideBySide(task.places))
+      !areSideBySide(task.places, instances, count))
     return false;
   return std::all_of(instances, instances + count, [](const TaskInstance* instance) {
-    return instance->morphs.empty() && instance->result == nullptr && areSideBySide(*instance);
+    return instance->morphs.empty() && instance->result == nullptr;
   });
 }
 
@@ -186,7 +177,7 @@ inline HWY_ATTR void skinSection(const SectionTask& part) {
   scaled.scales = true;
   for (const TaskInstance& instance : task.instances) {
     if (instance.settles && task.places.hasMotion()) {
-      settle(task, instance, part.firstVertex, part.vertexEnd);
+      keepPositions(task, instance, part.firstVertex, part.vertexEnd);
       continue;
     }
     for (Group* const other : {&group, &scaled}) {

@@ -53,8 +53,10 @@ DERMIS_INLINE void skinInstances(D d, const PlainTask& task, const Palette& pale
         Vec<D> m[3][4];
         sumFour<influences, 3, false>(d, rows, nullptr, joint, nullptr, weight, count, m);
         const Matrix<D> matrix{quadOf<D>(m[0]), quadOf<D>(m[1]), quadOf<D>(m[2])};
+        const DirectionMap<D> map = directionMap(d, matrix, true);
+        const Vec3<D> normal = from.load(d, normals);
         storeVertices(d, throughMatrix(matrix, from.load(d, positions)),
-                      normalThrough(d, matrix, from.load(d, normals), true), to);
+                      unitOr(d, mapNormal(map, normal), normal), to);
       } else {
         Vec3<D> position, normal;
         if constexpr (kind == PlainKind::scaled) {

@@ -156,12 +156,11 @@ HWY_NOINLINE HWY_ATTR void sumUnits(D d, const float* const* quads, const float*
       } else {
 #if HWY_MAX_BYTES >= 32
         if constexpr (K >= 2) {
+          constexpr std::size_t begin = hasPivots ? 1 : 0;
           Vec<D> rows[8];
           for (std::size_t i = 0; i < 8; ++i) {
-            rows[i] = sumVertex < influences(),
-            hasPivots
-                ? 1
-                : 0 > (d, quads[0], K == 3 ? 2 : 1, number + i * count, weight + i * count, count);
+            rows[i] = sumVertex<influences(), begin>(d, quads[0], K == 3 ? 2 : 1,
+                                                     number + i * count, weight + i * count, count);
             if (hasPivots) rows[i] = hn::Add(hn::LoadU(d, pivots[0] + joint[i * count]), rows[i]);
           }
           columnsOf(d, rows, own);
@@ -375,33 +374,14 @@ DERMIS_INLINE Matrix<D> matrixOf(const Vec<D>* v) {
 }
 
 template <class D>
+DERMIS_INLINE Vec3<D> threeOf(const Vec<D>* v) {
+  return {v[0], v[1], v[2]};
+}
+template <class D>
 DERMIS_INLINE void setThree(Vec<D>* to, const Vec3<D>& v) {
   to[0] = v.x;
   to[1] = v.y;
   to[2] = v.z;
-}
-
-/// The first phase: scales and shears the directions of a unit in bind space, into its slots.
-/// Returns the blended part.
-template <bool isWhole, class D, class Wanted>
-DERMIS_INLINE Part<D> scaleDirections(D d, const Source& from, bool isModerate, std::size_t unit,
-                                      Wanted wanted, Tile<D>& tile) {
-  const Vec<D>* const p = tile.parts[unit];
-  const Part<D> part = partOf<D>(p[0], p[1], p[2], p[3], p[4], p[5]);
-  if (!wanted.any()) return part;
-  const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, isModerate);
-  if (wanted.normals) {
-    setThree(tile.slots[unit] + 4,
-             unitOr(d, mapNormal(map, loadThree<isWhole>(d, from.givenNormals, 3, unit)),
-                    loadThree<isWhole>(d, from.normals, 3, unit)));
-  }
-  if constexpr (Wanted::tangents) {
-    setThree(tile.slots[unit] + 8,
-             unitOr(d, mapTangent(map, loadThree<isWhole>(d, from.givenTangents, 4, unit)),
-                    loadThree<isWhole>(d, from.tangents, 4, unit)));
-    tile.slots[unit][11] = hn::Mul(loadComponent<isWhole>(d, from.tangents, 4, 3, unit), map.side);
-  }
-  return part;
 }
 
 enum class Formula : std::uint8_t { linear, turned, other };
@@ -419,6 +399,28 @@ struct Reader {
   DERMIS_INLINE Vec<D> hand() const { return loadComponent<isWhole>(d, from.tangents, 4, 3, unit); }
 };
 
+/// The first phase: scales and shears the directions of a unit in bind space, into its slots.
+/// Returns the blended part.
+template <bool tangents, bool isWhole, class D>
+DERMIS_INLINE Part<D> scaleDirections(D d, const Reader<isWhole, D>& read, bool isModerate,
+                                      bool normals, Tile<D>& tile) {
+  const Vec<D>* const p = tile.parts[read.unit];
+  const Part<D> part = partOf<D>(p[0], p[1], p[2], p[3], p[4], p[5]);
+  if (!normals && !tangents) return part;
+  const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, isModerate);
+  Vec<D>* const to = tile.slots[read.unit];
+  if (normals) {
+    const Vec3<D> given = loadThree<isWhole>(d, read.from.givenNormals, 3, read.unit);
+    setThree(to + 4, unitOr(d, mapNormal(map, given), read.normal()));
+  }
+  if constexpr (tangents) {
+    const Vec3<D> given = loadThree<isWhole>(d, read.from.givenTangents, 4, read.unit);
+    setThree(to + 8, unitOr(d, mapTangent(map, given), read.tangent()));
+    to[11] = hn::Mul(read.hand(), map.side);
+  }
+  return part;
+}
+
 /// Skins a unit by a blended matrix into its slots.
 template <bool tangents, class D, class Reader>
 DERMIS_INLINE void moveUnit(D d, const Matrix<D>& matrix, bool isModerate, const Reader& read,
@@ -433,25 +435,11 @@ DERMIS_INLINE void moveUnit(D d, const Matrix<D>& matrix, bool isModerate, const
   }
 }
 
-/// Skins a unit by a dual quaternion, without scale, into its slots.
-template <bool tangents, class D, class Reader>
-DERMIS_INLINE void turnUnit(D d, const Vec4<D>& real, const Vec4<D>& dual, const Reader& read,
-                            bool normals, Vec<D>* to) {
-  const Vec<D> factor = turningFactor(d, real);
-  setThree(to, movePoint(real, dual, factor, read.position()));
-  if (normals) setThree(to + 4, turnDirection(real, factor, read.normal()));
-  if constexpr (tangents) {
-    setThree(to + 8, turnDirection(real, factor, read.tangent()));
-    to[11] = read.hand();
-  }
-}
-
 /// Skins the vertices of a tile into its slots. What is read is read late, and what is known is
 /// stored at once: there are few registers. `scales`: the palette has scale/shear parts.
 template <Formula formula, bool scales, bool tangents, bool isWhole, bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const Source& from,
                                      bool normals, std::size_t units, Tile<D>& tile) {
-  const Wanted<tangents> wanted{normals};
   for (std::size_t unit = 0; unit < units; ++unit) {
     Vec<D>* const to = tile.slots[unit];
     const Reader<isWhole, D> read{d, from, unit};
@@ -459,13 +447,8 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
       moveUnit<tangents>(d, matrixOf<D>(tile.rows[unit]), isModerate, read, normals, to);
       continue;
     }
-    if constexpr (formula == Formula::turned && !scales) {
-      turnUnit<tangents>(d, quadOf<D>(tile.dualQuaternions[unit]),
-                         quadOf<D>(tile.dualQuaternions[unit] + 4), read, normals, to);
-      continue;
-    }
     Part<D> part{};
-    if constexpr (scales) part = scaleDirections<isWhole>(d, from, isModerate, unit, wanted, tile);
+    if constexpr (scales) part = scaleDirections<tangents>(d, read, isModerate, normals, tile);
     const auto scaled = [&](const Vec3<D>& point)
                             HWY_ATTR { return scales ? throughPart(part, point) : point; };
     const Vec4<D> real = quadOf<D>(tile.dualQuaternions[unit]);
@@ -475,9 +458,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
     };
 
     // The second phase: rotate and translate.
-    if constexpr (formula == Formula::turned) {
-      setThree(to, move(scaled(read.position())));
-    } else if (method == Method::blended) {
+    if (formula == Formula::turned || method == Method::blended) {
       setThree(to, move(scaled(read.position())));
     } else {
       const Vec3<D> center = loadThree<isLone>(d, from.centers, 3, unit);
@@ -492,36 +473,31 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, Method method, bool isModerate, const 
       }
     }
     if (normals) {
-      const Vec3<D> normal = scales ? Vec3<D>{to[4], to[5], to[6]} : read.normal();
+      const Vec3<D> normal = scales ? threeOf<D>(to + 4) : read.normal();
       setThree(to + 4, turnDirection(real, factor, normal));
     }
     if constexpr (tangents) {
-      const Vec3<D> tangent = scales ? Vec3<D>{to[8], to[9], to[10]} : read.tangent();
+      const Vec3<D> tangent = scales ? threeOf<D>(to + 8) : read.tangent();
       setThree(to + 8, turnDirection(real, factor, tangent));
       if (!scales) to[11] = read.hand();
     }
     if (formula != Formula::other || method != Method::blended) continue;
 
-    // Between the linearly blended vertex and this one.
-    const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    Vertex<D> bind{read.position(), none, none, hn::Zero(d)},
-        turned{{to[0], to[1], to[2]}, none, none, hn::Zero(d)};
-    if (normals) {
-      bind.normal = read.normal();
-      turned.normal = {to[4], to[5], to[6]};
-    }
-    if constexpr (tangents) {
-      bind.tangent = read.tangent();
-      bind.hand = read.hand();
-      turned.tangent = {to[8], to[9], to[10]};
-    }
+    // Between the linearly blended vertex and this one, whose handedness stays.
+    Vec<D> straight[12];
+    moveUnit<tangents>(d, matrixOf<D>(tile.rows[unit]), isModerate, read, normals, straight);
     const Vec<D> share = loadComponent<isLone>(d, from.shares, 1, 0, unit);
-    const Vertex<D> straight =
-        throughMatrix(d, matrixOf<D>(tile.rows[unit]), bind, wanted, isModerate);
-    const Vertex<D> mixed = mixVertices(d, straight, turned, share, wanted);
-    setThree(to, mixed.position);
-    if (normals) setThree(to + 4, mixed.normal);
-    if constexpr (tangents) setThree(to + 8, mixed.tangent);
+    const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
+    const auto isTurned = hn::Ge(share, one);
+    const auto mix = [&](std::size_t slot, bool isDirection) HWY_ATTR {
+      const Vec3<D> turned = threeOf<D>(to + slot);
+      const Vec3<D> mixed = add3(scale3(threeOf<D>(straight + slot), rest), scale3(turned, share));
+      setThree(to + slot,
+               choose3(isTurned, turned, isDirection ? unitOr(d, mixed, turned) : mixed));
+    };
+    mix(0, false);
+    if (normals) mix(4, true);
+    if constexpr (tangents) mix(8, true);
   }
 }
 
@@ -666,6 +642,15 @@ HWY_NOINLINE HWY_ATTR void encodeUnits(D d, VertexFormat format, std::size_t uni
 
 // -- Storing.
 
+/// Copies the positions of vertices `first` to `end` to their previous positions.
+inline void keepPositions(const Task& task, const TaskInstance& instance, std::size_t first,
+                          std::size_t end) {
+  const OutputAttribute &from = task.places[Stream::positions],
+                        &to = task.places[Stream::previousPositions];
+  copyLanes(instance.outputs[Stream::previousPositions], to.stride,
+            instance.outputs[Stream::positions], from.stride, formatSize(from.format), first, end);
+}
+
 /// Attributes that are side by side in every instance, so that they are stored at once.
 struct Record {
   Stream stream{};             ///< of the first
@@ -792,20 +777,10 @@ HWY_NOINLINE HWY_ATTR void storeUnits(D d, const Quad& quad, std::size_t stride,
   }
 }
 
-/// Whether a record is positions and normals as float32x3, with nothing else in a vertex.
-inline bool isUsualRecord(const Record& record, std::size_t stride, std::byte* const* to,
-                          std::size_t instances) {
-  constexpr std::uint8_t slots[] = {0, 1, 2, 4, 5, 6};
-  return record.slots == std::size(slots) && std::ranges::equal(slots, std::span(record.slot, 6)) &&
-         record.bytes == vertexFloats * sizeof(float) && stride == record.bytes &&
-         std::all_of(to, to + instances, [](const std::byte* place) {
-           return reinterpret_cast<std::uintptr_t>(place) % alignof(float) == 0;
-         });
-}
-
+/// Stores positions and normals as float32x3, side by side, of whole units.
 template <bool isLone, class D>
-HWY_NOINLINE HWY_ATTR void storeUsual(D d, std::byte* const* to, std::size_t first, std::size_t end,
-                                      const Tile<D>& tile) {
+HWY_NOINLINE HWY_ATTR void storeSideBySide(D d, std::byte* const* to, std::size_t first,
+                                           std::size_t end, const Tile<D>& tile) {
   float* places[blocksOf<D>];
   for (std::size_t i = 0; i < blocksOf<D>; ++i) {
     places[i] = reinterpret_cast<float*>(to[isLone ? 0 : i]) +
@@ -813,7 +788,7 @@ HWY_NOINLINE HWY_ATTR void storeUsual(D d, std::byte* const* to, std::size_t fir
   }
   for (std::size_t unit = first; unit < end; ++unit) {
     const Vec<D>* const v = tile.slots[unit];
-    storeVertices(d, Vec3<D>{v[0], v[1], v[2]}, Vec3<D>{v[4], v[5], v[6]}, places);
+    storeVertices(d, threeOf<D>(v), threeOf<D>(v + 4), places);
     for (float*& next : places) next += unitVertices<isLone, D> * vertexFloats;
   }
 }
@@ -839,29 +814,30 @@ HWY_NOINLINE HWY_ATTR void storeSome(D d, const Quad& quad, std::size_t stride,
 }
 
 /// Stores the vertices of a tile. `to`: where the first vertex of each instance goes.
+/// `isSideBySide`: the record is what `storeSideBySide` stores.
 template <bool isLone, class D>
-inline HWY_ATTR void storeRecord(D d, const Record& record, std::size_t stride,
+inline HWY_ATTR void storeRecord(D d, const Record& record, bool isSideBySide, std::size_t stride,
                                  std::byte* const* to, const VertexRange& range,
                                  const Tile<D>& tile) {
   constexpr std::size_t vertices = unitVertices<isLone, D>;
   const std::size_t whole = (range.first + vertices - 1) / vertices;
   const std::size_t wholeEnd = std::max(whole, range.end / vertices);
-  const bool isUsual = isUsualRecord(record, stride, to, isLone ? 1 : blocksOf<D>);
-  if (isUsual) storeUsual<isLone>(d, to, whole, wholeEnd, tile);
+  if (isSideBySide) storeSideBySide<isLone>(d, to, whole, wholeEnd, tile);
   for (std::size_t first = 0; first < record.slots; first += 4) {
     Quad quad{{}, std::min<std::size_t>(record.bytes - first * 4, 16), first * 4};
     for (std::size_t k = 0; k < 4; ++k)
       quad.slot[k] = record.slot[std::min<std::size_t>(first + k, record.slots - 1)];
     if (range.first != whole * vertices)
       storeSome<isLone>(d, quad, stride, to, range.first / vertices, range, tile);
-    if (!isUsual)
+    if (!isSideBySide) {
       bySize(static_cast<std::uint32_t>(quad.bytes), [&](auto size) HWY_ATTR {
         if (size() % 4 == 0 && stride == size()) {
-          storeUnits<isLone, size(), true>(d, quad, stride, to, whole, wholeEnd, tile);
+          storeUnits<isLone, size(), size() < 16>(d, quad, stride, to, whole, wholeEnd, tile);
         } else {
           storeUnits<isLone, size(), false>(d, quad, stride, to, whole, wholeEnd, tile);
         }
       });
+    }
     if (range.end > wholeEnd * vertices)
       storeSome<isLone>(d, quad, stride, to, wholeEnd, range, tile);
   }
@@ -884,6 +860,7 @@ struct Company {
   const abi::MorphRecord* targets;  ///< the active ones of all instances, one after the other
   Records records = recordsOf(task.places, instances, count);
   bool isMorphed = !instances[0]->morphs.empty();
+  bool isSideBySide = areSideBySide(task.places, instances, count);
   bool hasResults = std::any_of(instances, instances + count, [](const TaskInstance* instance) {
     return instance->result != nullptr;
   });
@@ -970,14 +947,9 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
   // The previous positions are those in the output, or those that are stored now.
   const auto copyPositions = [&](bool restart) HWY_ATTR {
     if (!places.hasMotion()) return;
-    const OutputAttribute &source = places[Stream::positions],
-                          &target = places[Stream::previousPositions];
     for (std::size_t i = 0; i < instanceCount; ++i) {
-      if (instances[i]->restartsMotion != restart) continue;
-      const ByStream<std::byte*>& outputs = instances[i]->outputs;
-      copyLanes(outputs[Stream::previousPositions] + vertex * target.stride, target.stride,
-                outputs[Stream::positions] + vertex * source.stride, source.stride,
-                formatSize(source.format), range.first, range.end);
+      if (instances[i]->restartsMotion == restart)
+        keepPositions(task, *instances[i], vertex + range.first, vertex + range.end);
     }
   };
   copyPositions(false);
@@ -987,7 +959,8 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
     std::byte* to[instanceCount];
     for (std::size_t i = 0; i < instanceCount; ++i)
       to[i] = instances[i]->outputs[record.stream] + vertex * stride;
-    storeRecord<isLone>(d, record, stride, to, range, tile);
+    storeRecord<isLone>(d, record, company.isSideBySide && record.stream == Stream::positions,
+                        stride, to, range, tile);
   }
   copyPositions(true);
 }

@@ -1,4 +1,4 @@
-// How one vertex in each lane is skinned: the formulas of the methods.
+// How the vertex in each lane is skinned: the formulas of the methods.
 #pragma once
 
 #include "cpu/mesh_data.h"
@@ -6,19 +6,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
-
-template <class D>
-struct Vertex {
-  Vec3<D> position;
-  Vec3<D> normal, tangent;  ///< of unit length, or zero
-  Vec<D> hand;
-};
-
-template <class D>
-DERMIS_INLINE Vec3<D> loadVector(D d, const Lanes* lanes, std::size_t first) {
-  return {hn::Load(d, lanes[0].v + first), hn::Load(d, lanes[1].v + first),
-          hn::Load(d, lanes[2].v + first)};
-}
 
 /// Rotates v by q, where `factor` is 2 / |q|²: v + factor r × (r × v + w v).
 template <class D>
@@ -103,44 +90,6 @@ DERMIS_INLINE DirectionMap<D> directionMap(D d, const Matrix<D>& m, bool isModer
   return directionMap(d, Vec3<D>{m.r0.x, m.r0.y, m.r0.z}, Vec3<D>{m.r1.x, m.r1.y, m.r1.z},
                       Vec3<D>{m.r2.x, m.r2.y, m.r2.z}, isModerate);
 }
-template <class D>
-DERMIS_INLINE Vec3<D> normalThrough(D d, const Matrix<D>& m, const Vec3<D>& normal,
-                                    bool isModerate) {
-  return unitOr(d, mapNormal(directionMap(d, m, isModerate), normal), normal);
-}
-
-/// Selects the directions of a vertex that are stored; the others are not computed.
-template <bool withTangents>
-struct Wanted {
-  static constexpr bool tangents = withTangents;
-  bool normals = false;
-
-  bool any() const { return normals || tangents; }
-};
-
-/// Transforms `normal` and `tangent` by a map and stores them in `v`. A direction that becomes zero
-/// keeps its value in `v`.
-template <class D, class Wanted>
-DERMIS_INLINE void mapDirections(D d, const DirectionMap<D>& map, const Vec3<D>& normal,
-                                 const Vec3<D>& tangent, Wanted wanted, Vertex<D>& v) {
-  if (wanted.normals) v.normal = unitOr(d, mapNormal(map, normal), v.normal);
-  if constexpr (Wanted::tangents) {
-    v.tangent = unitOr(d, mapTangent(map, tangent), v.tangent);
-    v.hand = hn::Mul(v.hand, map.side);
-  }
-}
-
-/// Transforms a vertex by a blended matrix.
-template <class D, class Wanted>
-DERMIS_INLINE Vertex<D> throughMatrix(D d, const Matrix<D>& m, const Vertex<D>& v, Wanted wanted,
-                                      bool isModerate) {
-  Vertex<D> skinned = v;
-  skinned.position = throughMatrix(m, v.position);
-  if (wanted.any()) {
-    mapDirections(d, directionMap(d, m, isModerate), v.normal, v.tangent, wanted, skinned);
-  }
-  return skinned;
-}
 
 /// A blended scale/shear part.
 template <class D>
@@ -156,24 +105,6 @@ DERMIS_INLINE Part<D> partOf(Vec<D> xx, Vec<D> yy, Vec<D> zz, Vec<D> xy, Vec<D> 
 template <class D>
 DERMIS_INLINE Vec3<D> throughPart(const Part<D>& part, const Vec3<D>& p) {
   return {dot3(part.r0, p), dot3(part.r1, p), dot3(part.r2, p)};
-}
-
-/// Interpolates between a linearly blended vertex and a rotated one. Handedness comes from the
-/// latter.
-template <class D, class Wanted>
-DERMIS_INLINE Vertex<D> mixVertices(D d, const Vertex<D>& straight, const Vertex<D>& turned,
-                                    Vec<D> share, Wanted wanted) {
-  const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
-  const auto mix = [&](const Vec3<D>& a, const Vec3<D>& b)
-                       HWY_ATTR { return add3(scale3(a, rest), scale3(b, share)); };
-  const auto isTurned = hn::Ge(share, one);
-  Vertex<D> mixed = turned;
-  mixed.position = choose3(isTurned, turned.position, mix(straight.position, turned.position));
-  const auto mixDirection = [&](const Vec3<D>& a, const Vec3<D>& b)
-                                HWY_ATTR { return choose3(isTurned, b, unitOr(d, mix(a, b), b)); };
-  if (wanted.normals) mixed.normal = mixDirection(straight.normal, turned.normal);
-  if constexpr (Wanted::tangents) mixed.tangent = mixDirection(straight.tangent, turned.tangent);
-  return mixed;
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE
