@@ -410,7 +410,7 @@ Run addVerify(CLI::App& app) {
   command->add_flag("--random", options->random,
                     "Also verify random meshes, with other input formats and unusual sizes");
   command->add_flag("--quick", options->quick,
-                    "Verify in seconds: all methods, but fewer formats, numbers of influences and "
+                    "Verify a part: all methods, but fewer formats, numbers of influences and "
                     "sizes");
   command->add_option(
       "--device", options->device,

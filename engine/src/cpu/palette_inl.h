@@ -80,7 +80,7 @@ struct Palette {
   const float* parts[2] = {};      ///< scale/shear parts of joints
   const float* rows[3] = {};       ///< of the matrices of joints
   bool scales = false;
-  bool isModerate = false;  ///< result of `areModerate`, for linear blending
+  bool isModerate = false;  ///< result of `areModerate`, for directions
 };
 
 /// Writes the rows of R S | t of a decomposed joint, `apart` floats apart.

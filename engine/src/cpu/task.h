@@ -57,7 +57,8 @@ Result<void> checkMethod(Method method, const char* subject);
 void skinTask(const Task& task);
 
 /// Uses the best instruction set of the processor, or the one that `setTarget` chose. `scratch`
-/// points to three objects: for one instance, several instances at a time, and several that scale.
+/// points to three objects: for what is skinned, and for the joints of instances that wait for
+/// others, those that do not scale and those that do.
 void dispatchTask(const Task& task, Scratch* scratch);
 
 }  // namespace dermis::cpu

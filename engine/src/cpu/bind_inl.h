@@ -1,0 +1,192 @@
+// Where the vertices of a tile in bind pose are read from, and morph targets.
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "cpu/morph.h"
+#include "cpu/tile_inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dermis::cpu::HWY_NAMESPACE {
+
+/// Where the vertices of a tile are read from. In the mesh a vertex is the same for all instances.
+struct Source {
+  const float *positions = nullptr, *normals = nullptr, *tangents = nullptr;
+  const float *givenNormals = nullptr, *givenTangents = nullptr;
+  const float *centers = nullptr, *shares = nullptr;
+  bool isWhole = false;  ///< a vector for each component, except of centers and shares
+};
+
+/// Component `index` of `components` of a unit's vertices.
+template <bool isWhole, class D>
+DERMIS_INLINE Vec<D> loadComponent(D d, const float* first, std::size_t components,
+                                   std::size_t index, std::size_t unit) {
+  if constexpr (isWhole) {
+    return hn::Load(d, first + (unit * components + index) * hn::MaxLanes(d));
+  } else {
+    return hn::LoadDup128(d,
+                          first + (unit / 2 * components + index) * blockVertices + unit % 2 * 4);
+  }
+}
+template <bool isWhole, class D>
+DERMIS_INLINE Vec3<D> loadThree(D d, const float* first, std::size_t components, std::size_t unit) {
+  return {loadComponent<isWhole>(d, first, components, 0, unit),
+          loadComponent<isWhole>(d, first, components, 1, unit),
+          loadComponent<isWhole>(d, first, components, 2, unit)};
+}
+
+inline const float* blockOf(const std::vector<Lanes>& lanes, std::size_t components,
+                            std::uint32_t block) {
+  return lanes.empty() ? nullptr : lanes[block * components].v;
+}
+
+inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block, bool isLone) {
+  Source from;
+  from.positions = blockOf(mesh.positions, 3, block);
+  from.normals = blockOf(mesh.normals, 3, block);
+  from.givenNormals = blockOf(mesh.givenNormals, 3, block);
+  from.tangents = blockOf(mesh.tangents, 4, block);
+  from.givenTangents = blockOf(mesh.givenTangents, 4, block);
+  from.centers = blockOf(mesh.centers, 3, block);
+  from.shares = method == Method::blended ? blockOf(mesh.dualQuaternionWeights, 1, block)
+                                          : blockOf(mesh.bulgeStrengths, 1, block);
+  from.isWhole = isLone;
+  return from;
+}
+
+/// Adds the displacements of a target to all vertices of a block. `components`: positions, then
+/// normals and tangents if the target displaces them; null if not wanted.
+inline HWY_ATTR void displaceAll(const Displacements& displacements, float weight,
+                                 Lanes* const* components) {
+  const Wide d;
+  const Vec<Wide> w = hn::Set(d, weight);
+  const std::size_t size = displacements.size;
+  for (std::size_t lane = 0; lane < blockVertices; lane += hn::MaxLanes(d)) {
+    const auto* const from = reinterpret_cast<const float*>(displacements.words) + lane * size;
+    const auto add = [&](std::size_t component, Vec<Wide> value) HWY_ATTR {
+      if (components[component] == nullptr) return;
+      float* const to = components[component]->v + lane;
+      hn::Store(hn::Add(hn::Load(d, to), hn::Mul(w, value)), d, to);
+    };
+    if (size == 3) {
+      Vec<Wide> x, y, z;
+      hn::LoadInterleaved3(d, from, x, y, z);
+      add(0, x);
+      add(1, y);
+      add(2, z);
+      continue;
+    }
+    // Four components at a time. The last four may begin with some that were added before.
+    for (std::size_t done = 0; done < size;) {
+      const std::size_t first = std::min(done, size - 4);
+      const Vec4<Wide> rows = loadRows(d, from + first, size);
+      const Vec<Wide> four[4] = {rows.x, rows.y, rows.z, rows.w};
+      for (; done < first + 4; ++done) add(done, four[done - first]);
+    }
+  }
+}
+
+inline HWY_ATTR void morphBlocks(const MeshData& mesh, std::uint32_t firstBlock,
+                                 std::uint32_t blockEnd, std::span<const MorphWeight> morphs,
+                                 const abi::MorphRecord* targets, MorphedBlock* blocks) {
+  Lanes* const noLanes = nullptr;
+  for (std::size_t i = 0; i < morphs.size(); ++i) {
+    const abi::MorphRecord& target = targets[i];
+    const float weight = morphs[i].weight;
+    const std::uint32_t first = firstBlock * blockVertices / abi::MORPH_BLOCK_VERTICES;
+    const std::uint32_t last = (blockEnd * blockVertices - 1) / abi::MORPH_BLOCK_VERTICES;
+    if (weight == 0 || last < target.firstBlock || first >= target.firstBlock + target.blockCount)
+      continue;
+    for (std::uint32_t number = firstBlock; number < blockEnd; ++number) {
+      const Displacements found = displacementsOf(mesh, target, number);
+      if (found.mask == 0) continue;
+      MorphedBlock& block = blocks[number - firstBlock];
+      Lanes* const normals = mesh.normals.empty() ? noLanes : block.normals;
+      Lanes* const tangents = mesh.tangents.empty() ? noLanes : block.tangents;
+      if (found.mask != 0xff) {
+        displace(found, target.attributes, weight, block.positions, normals, tangents);
+        continue;
+      }
+      Lanes* components[9];
+      std::size_t count = 0;
+      for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, block.positions},
+                                             {abi::MORPH_HAS_NORMALS, normals},
+                                             {abi::MORPH_HAS_TANGENTS, tangents}}) {
+        if ((target.attributes & attribute) == 0) continue;
+        for (std::size_t k = 0; k < 3; ++k)
+          components[count++] = lanes == nullptr ? nullptr : lanes + k;
+      }
+      displaceAll(found, weight, components);
+    }
+  }
+}
+
+/// Morphs the blocks of a tile for instances that have active targets. `targets`: those of the
+/// first instance, then those of the others.
+template <bool isLone, class D>
+HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t firstBlock,
+                                     std::uint32_t blockEnd, const TaskInstance* const* instances,
+                                     const abi::MorphRecord* targets, Tile<D>& tile, Source& from) {
+  const auto scatter = [&](const Lanes& lanes, std::size_t unit, std::size_t i, Vec<D>* to) {
+    // The memory of a vector is its lanes, in order.
+    auto* const memory = reinterpret_cast<std::byte*>(to);
+    if constexpr (isLone) {
+      std::memcpy(memory, lanes.v, sizeof(lanes.v));
+    } else {
+      std::memcpy(memory + i * 16, lanes.v + unit % 2 * 4, 16);
+    }
+  };
+  constexpr std::size_t unitsEach = isLone ? 1 : 2;
+  const std::size_t units =
+      std::min<std::size_t>((blockEnd - firstBlock) * unitsEach, Tile<D>::most);
+  const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
+  for (std::size_t i = 0; i < (isLone ? 1 : blocksOf<D>); ++i) {
+    for (std::size_t k = 0; k < units / unitsEach; ++k) {
+      MorphedBlock& block = tile.blocks[k];
+      const std::size_t number = firstBlock + k;
+      std::copy_n(mesh.positions.data() + number * 3, 3, block.positions);
+      if (normals) std::copy_n(mesh.givenNormals.data() + number * 3, 3, block.normals);
+      if (tangents) {
+        std::copy_n(mesh.givenTangents.data() + number * 4, 3, block.tangents);
+        block.tangents[3] = mesh.tangents[number * 4 + 3];
+      }
+    }
+    const std::span<const MorphWeight> morphs = instances[i]->morphs;
+    morphBlocks(mesh, firstBlock, blockEnd, morphs, targets, tile.blocks);
+    targets += morphs.size();
+    for (std::size_t unit = 0; unit < units; ++unit) {
+      const MorphedBlock& block = tile.blocks[unit / unitsEach];
+      for (std::size_t c = 0; c < 3; ++c) {
+        scatter(block.positions[c], unit, i, &tile.positions[unit][c]);
+        if (normals) scatter(block.normals[c], unit, i, &tile.givenNormals[unit][c]);
+        if (tangents) scatter(block.tangents[c], unit, i, &tile.givenTangents[unit][c]);
+      }
+      if (tangents) scatter(block.tangents[3], unit, i, &tile.tangents[unit][3]);
+    }
+  }
+  const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  const auto unitVector = [&](const Vec<D>* given, Vec<D>* to) HWY_ATTR {
+    const Vec3<D> unit = unitOr(d, Vec3<D>{given[0], given[1], given[2]}, none);
+    to[0] = unit.x;
+    to[1] = unit.y;
+    to[2] = unit.z;
+  };
+  for (std::size_t unit = 0; unit < units; ++unit) {
+    if (normals) unitVector(tile.givenNormals[unit], tile.normals[unit]);
+    if (tangents) unitVector(tile.givenTangents[unit], tile.tangents[unit]);
+  }
+  const auto first = [](const auto& vectors) { return reinterpret_cast<const float*>(vectors); };
+  from.positions = first(tile.positions);
+  from.normals = first(tile.normals);
+  from.givenNormals = first(tile.givenNormals);
+  from.tangents = first(tile.tangents);
+  from.givenTangents = first(tile.givenTangents);
+  from.isWhole = true;
+}
+
+}  // namespace dermis::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
