@@ -15,6 +15,8 @@ set(dermisHeaders_verify verify.h)
 set(dermisHeaders_vulkan vulkan)
 set(dermisHeaders_shader_compiler compilers.h)
 set(dermisHeaders_gltf gltf.h)
+set(dermisHeaders_c dermis.h)
+set(dermisHeaders_c_compare dermis_compare.h)
 
 get_property(dermisLibraries GLOBAL PROPERTY DERMIS_LIBRARIES)
 set(dermisComponents)
@@ -23,7 +25,7 @@ foreach(library IN LISTS dermisLibraries)
   list(APPEND dermisComponents ${component})
   install(TARGETS ${library} EXPORT dermis_${component}
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis
-          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dermis_shared NAMELINK_COMPONENT dermis
           RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dermis
           INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(EXPORT dermis_${component} NAMESPACE dermis:: DESTINATION ${dermisPackageDir}
@@ -32,7 +34,7 @@ foreach(library IN LISTS dermisLibraries)
 endforeach()
 
 set(excluded)
-foreach(component IN ITEMS cpu verify vulkan shader_compiler gltf)
+foreach(component IN ITEMS cpu verify vulkan shader_compiler gltf c c_compare)
   if(NOT component IN_LIST dermisComponents)
     foreach(header IN LISTS dermisHeaders_${component})
       list(APPEND excluded PATTERN dermis/${header} EXCLUDE)
@@ -51,9 +53,15 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PR
         DESTINATION ${dermisDocDir} COMPONENT dermis)
 install(FILES ${PROJECT_SOURCE_DIR}/engine/README.md DESTINATION ${dermisDocDir}/engine COMPONENT dermis)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${dermisDocDir} COMPONENT dermis)
-foreach(sample IN ITEMS minimal allocator gpu_poses)
+foreach(sample IN ITEMS minimal allocator gpu_poses c python)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples/${sample} DESTINATION ${dermisDocDir}/samples COMPONENT dermis)
 endforeach()
+
+# Declarations for Python's cffi and LuaJIT's ffi.
+get_property(declarations GLOBAL PROPERTY DERMIS_CDEF)
+if(declarations)
+  install(FILES ${declarations} DESTINATION ${CMAKE_INSTALL_DATADIR}/dermis COMPONENT dermis)
+endif()
 
 # What a program links besides a static dermis::gltf.
 set(dermisLinkedDecoders)
@@ -61,6 +69,18 @@ if(NOT BUILD_SHARED_LIBS)
   set(dermisLinkedDecoders ${dermisDecoders})
 endif()
 list(TRANSFORM dermisLinkedDecoders REPLACE "(.+)" "\\1=\\1::\\1" OUTPUT_VARIABLE dermisDecoderTargets)
+
+# The libraries that those of the C interface are made of. Shared ones contain static ones.
+set(dermisBuiltOn_c_static core cpu vulkan)
+if(DERMIS_BUILD_GLTF)
+  list(APPEND dermisBuiltOn_c_static gltf)
+endif()
+set(dermisBuiltOn_c)
+set(dermisBuiltOn_c_compare)
+if(BUILD_SHARED_LIBS)
+  set(dermisBuiltOn_c ${dermisBuiltOn_c_static})
+  set(dermisBuiltOn_c_compare core verify)
+endif()
 
 # Once for the installed package, and once for the build folder.
 file(RELATIVE_PATH shaderDirFromPackage /${dermisPackageDir} /${dermisShaderDir})
@@ -73,8 +93,8 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
 install(FILES ${PROJECT_BINARY_DIR}/install/dermisConfig.cmake ${PROJECT_BINARY_DIR}/dermisConfigVersion.cmake
         DESTINATION ${dermisPackageDir} COMPONENT dermis)
 
-# pkg-config: `dermis` is core and vulkan; `dermis_NAME` is one of the libraries, except the two compilers. Paths are relative to
-# the file.
+# pkg-config: `dermis` is core and vulkan; `dermis_NAME` is one of the libraries, except the two compilers; `dermis-c` and
+# `dermis-c-compare` are the C interface. Paths are relative to the file.
 file(RELATIVE_PATH pkgConfigPrefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 set(pkgConfigFlags)
 if(BUILD_SHARED_LIBS)
@@ -93,7 +113,11 @@ function(dermis_pkg_config name requires library)
 endfunction()
 set(required)
 foreach(component IN LISTS dermisComponents)
-  if(NOT component MATCHES "_compiler$")
+  if(component STREQUAL "c")
+    dermis_pkg_config(dermis-c "" "-L\${libdir} -ldermis")
+  elseif(component STREQUAL "c_compare")
+    dermis_pkg_config(dermis-c-compare dermis-c "-L\${libdir} -ldermis_compare")
+  elseif(NOT component MATCHES "_compiler$|_static$")
     dermis_pkg_config(dermis_${component} "${pkgConfigRequires_${component}}" "-L\${libdir} -ldermis_${component}${pkgConfigLibraries_${component}}")
   endif()
   if(component MATCHES "^(core|vulkan)$")

@@ -1,9 +1,10 @@
 # Debian packages: `cmake --build BUILD --target package`, or cpack, or all steps by `cmake --workflow --preset debian`.
 #
-#   libdermis-dev   the libraries, their headers, the CMake package, pkg-config's files, the shaders, the documents
-#   dermis          the command, if the samples are built
+#   libdermis-dev      the libraries, their headers, the CMake package, pkg-config's files, the shaders, the documents
+#   libdermis0.1       the shared libraries of the C interface
+#   dermis             the command, if the samples are built
 #
-# The libraries are static, so the package is for the release of Debian that it was built on. -DCPACK_PACKAGE_CONTACT sets another
+# The C++ libraries are static, so the package is for the release of Debian that it was built on. -DCPACK_PACKAGE_CONTACT sets another
 # maintainer.
 
 set(notes ${PROJECT_BINARY_DIR}/install/debian)
@@ -47,7 +48,8 @@ function(dermis_debian_package component package section description)
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${description}" PARENT_SCOPE)
   foreach(field IN LISTS ARGN)
     string(REGEX MATCH "^([A-Z_]+)=(.*)$" ignored "${field}")
-    set(CPACK_DEBIAN_${upper}_${CMAKE_MATCH_1} "${CMAKE_MATCH_2}" PARENT_SCOPE)
+    string(REPLACE "|/" ";/" value "${CMAKE_MATCH_2}")
+    set(CPACK_DEBIAN_${upper}_${CMAKE_MATCH_1} "${value}" PARENT_SCOPE)
   endforeach()
   install(FILES ${notes}/copyright ${notes}/changelog.Debian.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
           COMPONENT ${component} EXCLUDE_FROM_ALL)
@@ -66,6 +68,19 @@ list(TRANSFORM dermisDecoders REPLACE "(.+)" "lib\\1-dev" OUTPUT_VARIABLE decode
 list(APPEND depends ${decoderPackages})
 if(shader_compiler IN_LIST dermisComponents)
   list(APPEND suggests glslang-dev glslang-tools spirv-tools)
+endif()
+if(c IN_LIST dermisComponents)
+  list(APPEND depends "libdermis${DERMIS_SOVERSION} (= ${PROJECT_VERSION}-1)")
+  # The dynamic linker finds new libraries once its cache has been made again.
+  file(WRITE ${notes}/triggers "activate-noawait ldconfig\n")
+  set(libraries "libdermis ${DERMIS_SOVERSION} libdermis${DERMIS_SOVERSION} (>= ${PROJECT_VERSION})\n")
+  if(c_compare IN_LIST dermisComponents)
+    string(APPEND libraries "libdermis_compare ${DERMIS_SOVERSION} libdermis${DERMIS_SOVERSION} (>= ${PROJECT_VERSION})\n")
+  endif()
+  file(WRITE ${notes}/shlibs "${libraries}")
+  dermis_debian_package(dermis_shared libdermis${DERMIS_SOVERSION} libs "Dermis skins characters on the GPU that an engine lends it. This
+package has the shared libraries of its C interface."
+    PACKAGE_SHLIBDEPS=ON PACKAGE_CONTROL_EXTRA=${notes}/triggers|${notes}/shlibs)
 endif()
 list(JOIN depends ", " depends)
 list(JOIN suggests ", " suggests)

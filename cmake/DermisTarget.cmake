@@ -75,6 +75,21 @@ function(dermis_configure_target target)
   target_link_options(${target} PRIVATE $<TARGET_PROPERTY:dermis_build_flags,INTERFACE_LINK_OPTIONS>)
 endfunction()
 
+# dermis_version_library(TARGET SYMBOL): the version of a shared library. SYMBOL is defined while it is compiled.
+function(dermis_version_library target symbol)
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL ${symbol} VERSION ${PROJECT_VERSION} SOVERSION ${DERMIS_SOVERSION}
+    # Libraries find each other in their own folder.
+    INSTALL_RPATH "$<IF:$<BOOL:${APPLE}>,@loader_path,$ORIGIN>")
+  if(NOT WIN32 AND NOT APPLE AND NOT DERMIS_SANITIZE)
+    target_link_options(${target} PRIVATE -Wl,--no-undefined)
+  endif()
+endfunction()
+# While the version is 0.x, a minor version may change the interface.
+set(DERMIS_SOVERSION ${PROJECT_VERSION_MAJOR})
+if(DERMIS_SOVERSION EQUAL 0)
+  set(DERMIS_SOVERSION 0.${PROJECT_VERSION_MINOR})
+endif()
+
 # dermis_add_library(NAME SOURCES...): adds the library dermis_NAME with the alias dermis::NAME and the public headers in
 # engine/include. It is installed with the package. Static, or shared with BUILD_SHARED_LIBS.
 function(dermis_add_library name)
@@ -92,16 +107,7 @@ function(dermis_add_library name)
   string(TOUPPER ${name} upperName)
   if(BUILD_SHARED_LIBS)
     target_compile_definitions(dermis_${name} PUBLIC DERMIS_SHARED)
-    # While the version is 0.x, a minor version may change the interface. Libraries find each other in their own folder.
-    set(soversion ${PROJECT_VERSION_MAJOR})
-    if(soversion EQUAL 0)
-      set(soversion 0.${PROJECT_VERSION_MINOR})
-    endif()
-    set_target_properties(dermis_${name} PROPERTIES DEFINE_SYMBOL DERMIS_BUILDS_${upperName}
-      VERSION ${PROJECT_VERSION} SOVERSION ${soversion} INSTALL_RPATH "$<IF:$<BOOL:${APPLE}>,@loader_path,$ORIGIN>")
-    if(NOT WIN32 AND NOT APPLE AND NOT DERMIS_SANITIZE)
-      target_link_options(dermis_${name} PRIVATE -Wl,--no-undefined)
-    endif()
+    dermis_version_library(dermis_${name} DERMIS_BUILDS_${upperName})
   endif()
   if(name MATCHES "^(core|runtime_compiler)$" OR DERMIS_BUILD_${upperName})  # not if it is only a tool of the build
     set_property(GLOBAL APPEND PROPERTY DERMIS_LIBRARIES dermis_${name})

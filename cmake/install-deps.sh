@@ -22,7 +22,7 @@ doxygen
 "
 if [ "${1:-}" = nightly ]; then
   packages="$packages
-clang ffmpeg blender python3-numpy spirv-cross
+clang ffmpeg blender python3-numpy python3-cffi python3-matplotlib bindgen rustc spirv-cross
 debootstrap lintian
 "
   command -v npm >/dev/null 2>&1 || packages="$packages nodejs npm" # from wherever they are

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 #include <string>
@@ -20,6 +21,7 @@
 
 #include "documents.h"
 #include "generated_parts.h"
+#include "run_command.h"
 #include "test_data.h"
 #include "test_paths.h"
 
@@ -182,6 +184,81 @@ TEST(DocumentationTest, TheManualIsComplete) {
     ++commands;
   }
   EXPECT_EQ(commands, 7);
+}
+
+/// All public headers, and what a build offers.
+std::string everythingThatHasAName() {
+  std::string text;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+           std::filesystem::path(sourceFolder) / "engine/include")) {
+    if (entry.is_regular_file())
+      text += readText("engine/include/" +
+                       std::filesystem::relative(
+                           entry.path(), std::filesystem::path(sourceFolder) / "engine/include")
+                           .generic_string());
+  }
+  for (const char* file :
+       {"samples/minimal/main.cpp", "cmake/DermisInstall.cmake", "engine/src/c/CMakeLists.txt"})
+    text += readText(file);
+  return text;
+}
+
+/// The page for a first integration: short, and every name, file and command in it exists. Its code
+/// and its numbers are held to their sources.
+TEST(DocumentationTest, TheQuickReferenceIsTrue) {
+  const std::string page = readText("docs/quick-reference.md"), known = everythingThatHasAName();
+  EXPECT_LE(std::ranges::count(page, '\n'), 150);
+  const std::set<std::string> components{"core", "cpu", "gltf", "verify", "vulkan"};
+  const std::regex span("`([^`\n]+)`"), word("[A-Za-z_][A-Za-z0-9_]*");
+  std::string prose;
+  bool isCode = false;
+  std::istringstream lines(page);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```"))
+      isCode = !isCode;
+    else if (!isCode)
+      prose += line + '\n';
+  }
+  int names = 0;
+  for (std::sregex_iterator found(prose.begin(), prose.end(), span), end; found != end; ++found) {
+    const std::string text = (*found)[1];
+    if (text.ends_with(".h")) {
+      EXPECT_TRUE(std::filesystem::exists(std::string(sourceFolder) + "/engine/include/" + text))
+          << text;
+    } else if (text.starts_with("find_package") || text == "add_subdirectory" ||
+               text.starts_with("dermis::") || text.starts_with("dermis-")) {
+      // The tests of the package use them.
+    } else if (text == "dermis" ||
+               (text.starts_with("dermis_") && components.contains(text.substr(7)))) {
+      // pkg-config: package.pkg_config
+    } else {
+      for (std::sregex_iterator part(text.begin(), text.end(), word); part != end; ++part) {
+        EXPECT_TRUE(std::regex_search(known, std::regex("\\b" + part->str() + "\\b"))) << text;
+        ++names;
+      }
+    }
+  }
+  EXPECT_GE(names, 35);
+
+  int commands = 0;
+  std::istringstream commandLines(page.substr(page.rfind("```sh")));
+  for (std::string line; std::getline(commandLines, line);) {
+    if (!line.starts_with("dermis ")) continue;
+    const std::filesystem::path output = std::filesystem::temp_directory_path() / "quick.ply";
+    std::vector<std::string> called;
+    std::istringstream words(line);
+    for (std::string argument; words >> argument;) {
+      called.push_back(called.empty()          ? dermisProgram
+                       : argument == "MODEL"   ? std::string(sampleModels) + "/bar.glb"
+                       : argument == "OUT.ply" ? output.string()
+                                               : argument);
+    }
+    if (line.find("verify") != std::string::npos) called.insert(called.end(), {"--device", "cpu"});
+    const CommandResult result = runCommand(called);
+    EXPECT_EQ(result.status, 0) << line << '\n' << result.output;
+    ++commands;
+  }
+  EXPECT_GE(commands, 3);
 }
 
 // How long the first page and the smallest programs are, and how much of the interface they need.

@@ -15,6 +15,7 @@
 
 #include "dermis/layout.h"
 #include "dermis/plan.h"
+#include "dermis/scene.h"
 #include "run_command.h"
 #include "scene/states.h"
 #include "test_paths.h"
@@ -54,6 +55,29 @@ std::string help(const std::string& command) {
   std::string printed;
   for (std::string line; std::getline(lines, line);) printed += wrapped(line);
   return printed;
+}
+
+/// What an engine has to know of sizes and limits.
+std::string numbers() {
+  const SceneDescription scene;
+  const DeviceLimits limits;
+  const std::pair<const char*, std::uint64_t> rows[] = {
+      {"bytes of a `JointMatrix`", sizeof(JointMatrix)},
+      {"maximum joints of a pose", maxPoseJoints},
+      {"frames in flight, by default", scene.framesInFlight},
+      {"storage buffers per stage, minimum", limits.maxStorageBuffersPerStage},
+      {"storage buffers per stage for bounds and snorm16 positions", storageBuffersWanted},
+      {"bytes of a vertex with float32x3 positions and normals",
+       placeVertices({.normals = VertexFormat::float32x3}, 1)->attributes[0].stride},
+      {"bytes of a vertex with float16x4 positions and octahedral16x2 normals",
+       placeVertices(
+           {.positions = VertexFormat::float16x4, .normals = VertexFormat::octahedral16x2}, 1)
+           ->attributes[0]
+           .stride}};
+  std::string table = "| | |\n| --- | --- |\n";
+  for (const auto& [what, number] : rows)
+    table += "| " + std::string(what) + " | " + std::to_string(number) + " |\n";
+  return table;
 }
 
 /// How many pipelines `Context::prepare` builds.
@@ -149,6 +173,7 @@ std::string generate(const HeldPart& part) {
   if (part.kind == "code") return code(part.source);
   if (part.kind == "help") return help(part.source);
   if (part.source == "pipelines") return pipelines();
+  if (part.source == "numbers") return numbers();
   if (part.source == "shapes") return shapes();
   if (part.source == "viewer keys") return viewerKeys();
   if (part.source == "trust") return trust();

@@ -46,13 +46,13 @@ check() { # PREFIX: checks that programs find Dermis there, and skin
   cp -r "$root$1/share/doc/dermis/samples" "$root/root/try"
   search=
   [ "$1" = /usr ] || search=-DCMAKE_PREFIX_PATH=$1
-  for project in samples/minimal samples/allocator consumers/ways; do
+  for project in samples/minimal samples/allocator samples/c consumers/ways; do
     inside cmake -S "/root/try/$project" -B "/root/try/$project/build" -G Ninja "-DDERMIS_VERSION=$version" $search
     inside cmake --build "/root/try/$project/build"
   done
   inside /root/try/consumers/ways/build/ways_consumer
-  for sample in minimal allocator; do
-    inside "/root/try/samples/$sample/build/dermis_$sample"
+  for sample in minimal/build/dermis_minimal allocator/build/dermis_allocator c/build/dermis_c_minimal; do
+    inside "/root/try/samples/$sample"
     expect "every vertex is right"
   done
 
@@ -119,7 +119,9 @@ inside cmake --build /root/build --target package
 rm -rf "$root/opt/dermis"
 # shellcheck disable=SC2086 # a list of words
 apt purge --autoremove $build_needs
-check_packages "/root/build/libdermis-dev_$version-1_$(dpkg --print-architecture).deb"
+architecture=$(dpkg --print-architecture)
+shared=$(cd "$root" && echo root/build/libdermis[0-9]*_"$version-1_$architecture".deb)
+check_packages "/root/build/libdermis-dev_$version-1_$architecture.deb" "/$shared"
 
 rm -rf "$root" "$root.log"
 say "all is right"

@@ -23,6 +23,7 @@
 #   packages     ways to use Dermis that compile it again: as a subproject, from its source package, with another compiler
 #   golden       the poses of three.js and Blender made again; they must be those in tests/golden
 #   showcase     the viewer in a window, and the film of a crowd
+#   languages    Python and Rust on the C interface: built, checked against the reference, and the speed of Python beside C++
 #   programs     the quick start in a fresh clone, and films by a real ffmpeg
 #
 # Installs what it needs with cmake/install-deps.sh nightly. A part that passes is written to tests/nightly/passed.tsv with the
@@ -33,7 +34,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 export CI="${CI:-true}"
 export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}" # LLVM, inside lavapipe, keeps memory until the process ends
-parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mutants mesa speed compilers gpu exhaustive packages golden showcase programs"
+parts="asan asan-rest tsan clang debian layers windows x86 arm64 libcxx fuzz mutants mesa speed compilers gpu exhaustive packages golden showcase languages programs"
 passed=tests/nightly/passed.tsv
 figures=build/nightly/figures # what a part counted
 device_suites='^([A-Za-z0-9_]+/)?(System|Batch|Limits|Product|Results|SomeMethods|Synchronization|Texel|Threads|AccelerationStructure|Accuracy|Method|Motion)[A-Za-z]*Test'
@@ -291,6 +292,11 @@ part_showcase() {
   cmake --preset ci -B build/showcase -DDERMIS_BUILD_SHOWCASE=ON
   cmake --build build/showcase --target showcase_tests
   ctest --test-dir build/showcase -L showcase --output-on-failure --no-tests=error --timeout 900
+}
+
+part_languages() {
+  build ci dermis_c dermis_c_compare dermis_cdef dermis_languages_benchmark
+  ./tests/nightly/languages.sh build/ci build/nightly/languages
 }
 
 part_programs() {

@@ -17,7 +17,14 @@ foreach(component IN LISTS components)
   list(APPEND expected ${libFolder}/libdermis_${component}.a
        ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
 endforeach()
-foreach(name IN ITEMS dermis dermis_core dermis_cpu dermis_gltf dermis_verify dermis_vulkan)
+foreach(name IN ITEMS libdermis libdermis_compare)
+  list(APPEND expected ${libFolder}/${name}.so ${libFolder}/${name}.so.${soversion} ${libFolder}/${name}.so.${version})
+endforeach()
+foreach(component IN ITEMS c c_compare c_static c_compare_static)
+  list(APPEND expected ${libFolder}/cmake/dermis/dermis_${component}_targets.cmake)
+endforeach()
+list(APPEND expected ${libFolder}/libdermis.a ${libFolder}/libdermis_compare.a ${dataFolder}/dermis/dermis.cdef.h)
+foreach(name IN ITEMS dermis dermis_core dermis_cpu dermis_gltf dermis_verify dermis_vulkan dermis-c dermis-c-compare)
   list(APPEND expected ${libFolder}/pkgconfig/${name}.pc)
 endforeach()
 list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/cmake/dermis/dermisConfigVersion.cmake
@@ -25,7 +32,8 @@ list(APPEND expected ${libFolder}/cmake/dermis/dermisConfig.cmake ${libFolder}/c
      ${dataFolder}/doc/dermis/SECURITY.md
      ${dataFolder}/doc/dermis/engine/README.md)
 file(GLOB_RECURSE documents RELATIVE "${sourceFolder}" "${sourceFolder}/docs/*" "${sourceFolder}/samples/minimal/*"
-     "${sourceFolder}/samples/allocator/*" "${sourceFolder}/samples/gpu_poses/*")
+     "${sourceFolder}/samples/allocator/*" "${sourceFolder}/samples/gpu_poses/*" "${sourceFolder}/samples/c/*"
+     "${sourceFolder}/samples/python/*")
 list(TRANSFORM documents PREPEND ${dataFolder}/doc/dermis/)
 list(APPEND expected ${documents})
 file(GLOB_RECURSE headers RELATIVE "${sourceFolder}/engine/include" "${sourceFolder}/engine/include/*.h")

@@ -1,0 +1,1061 @@
+// The C interface of Dermis: the library `dermis` has core, the CPU path, the Vulkan back end and,
+// if it was built with it, glTF import. C99. What a function, a method or a format means is
+// described in more detail in the C++ header that has it: mesh.h, layout.h, plan.h, scene.h, cpu.h,
+// gltf.h, vulkan/context.h, vulkan/scene_recorder.h.
+//
+// Rules, once:
+//
+// - A function that can fail returns a `dermis_code`. If it is not `DERMIS_OK`, `error` has a
+//   sentence about it, unless `error` is null; outputs are then unchanged, if the function does not
+//   say otherwise.
+// - A structure that begins with `size` may grow. The caller sets `size` to its sizeof, also in
+//   structures that a function fills. All elements of an array have the same `size`.
+// - Zero is the default of every other member: a structure of zeros with its `size` is valid,
+// except
+//   for what is marked as required.
+// - Nothing is kept of a pointer after the function returns, unless it says so. Lists that a
+//   function returns belong to the object; the function says how long they are valid.
+// - `dermis_destroy` destroys every object that a function creates. Using a destroyed object is
+//   undefined. Using the handle of a removed mesh, pose or instance is an error.
+// - One thread at a time may use an object. A context, a mesh and a model may be used by any number
+//   of threads. So may a plan, unless `dermis_make_plan` fills it.
+// - Callbacks get their `user` pointer first, and must not throw or longjmp. If one that creates
+//   something fails, the function that needs it fails with its code and error; a code that is not
+//   from `DERMIS_INVALID_ARGUMENT` to `DERMIS_IO_ERROR` counts as `DERMIS_VULKAN_ERROR`.
+// - If memory runs out, a function fails with `DERMIS_OUT_OF_MEMORY`; the object that was changed
+//   may then only be destroyed.
+#ifndef DERMIS_DERMIS_H
+#define DERMIS_DERMIS_H
+
+#ifndef DERMIS_CDEF  // cffi's declarations (dermis.cdef.h) are made with this, and have no
+                     // directives
+#include <stddef.h>
+#include <stdint.h>
+#ifdef DERMIS_VULKAN
+#include <vulkan/vulkan_core.h>
+#endif
+#endif
+
+// What the library exports. For the static library, define DERMIS_STATIC.
+#if defined(DERMIS_STATIC) || defined(DERMIS_CDEF)
+#define DERMIS_C_API
+#elif defined(_WIN32) && defined(DERMIS_BUILDS_C)
+#define DERMIS_C_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define DERMIS_C_API __declspec(dllimport)
+#else
+#define DERMIS_C_API __attribute__((visibility("default")))
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// ---- Errors, the version, objects.
+
+// What a function returns. The error sentence says what is wrong.
+typedef enum dermis_code {
+  DERMIS_OK = 0,
+  DERMIS_INVALID_ARGUMENT = 1,     // the caller broke a rule of the function
+  DERMIS_INVALID_MESH = 2,         // `dermis_pack` refuses the mesh; `dermis_repair` may help
+  DERMIS_INVALID_DATA = 3,         // a blob or file is damaged, or breaks the rules of its format
+  DERMIS_UNSUPPORTED_VERSION = 4,  // a blob is from another version of Dermis
+  DERMIS_UNSUPPORTED_FEATURE = 5,  // a file needs a feature that Dermis does not implement
+  DERMIS_LIMIT_EXCEEDED = 6,       // more than the device, or a type of the interface, can hold
+  DERMIS_NOT_PREPARED = 7,         // `dermis_record` needs a pipeline that was not prepared
+  DERMIS_MISSING_ENTRY_POINT = 8,  // the driver does not have a function, or it was not enabled
+  DERMIS_MISSING_FEATURE = 9,      // the device, or this build of Dermis, lacks a feature
+  DERMIS_VULKAN_ERROR = 10,        // a Vulkan function failed: `dermis_error::vulkan_result`
+  DERMIS_SHADER_ERROR = 11,        // SPIR-V is not valid
+  DERMIS_IO_ERROR = 12,            // a file cannot be opened or read
+  DERMIS_OUT_OF_MEMORY = 13,       // memory of the CPU
+  DERMIS_CODE_INT32 = 0x7fffffff   // not a value: the type has 32 bits
+} dermis_code;
+
+// Why a function failed. The caller owns it; functions write to it only if they fail.
+typedef struct dermis_error {
+  dermis_code code;
+  int32_t vulkan_result;  // the VkResult if a Vulkan function failed, otherwise 0
+  char message[504];      // UTF-8, one sentence without a full stop; cut if it is longer
+} dermis_error;
+
+// The version of this header: major · 10000 + minor · 100 + patch.
+enum { DERMIS_HEADER_VERSION = 100 };
+// The version of the library. Its interface fits this header if the major versions are equal and
+// its minor version is not lower; while the major version is 0, if the minor versions are equal.
+DERMIS_C_API uint32_t dermis_version(void);
+
+// Destroys an object: one that a function of this header returned to its last parameter but one.
+// Null is ignored. A scene is not such an object: it belongs to its recorder, runner or commands.
+DERMIS_C_API void dermis_destroy(void* object);
+
+// ---- Plain data.
+
+// Handles of the objects in a scene. The handle of a removed object is never valid again. All zeros
+// are no object. `kind` is set by Dermis, so that a handle of one kind is an error where another
+// kind is expected, in any language.
+typedef struct dermis_mesh {
+  uint32_t kind, index, generation;
+} dermis_mesh;
+typedef struct dermis_pose {
+  uint32_t kind, index, generation;
+} dermis_pose;
+typedef struct dermis_instance {
+  uint32_t kind, index, generation;
+} dermis_instance;
+
+// A joint matrix: joint global transform × inverse bind matrix. An affine transform as a row-major
+// 3×4 matrix, m[row][column]; column 3 is the translation. Skinned vertices are in the space of the
+// joint global transforms.
+typedef struct dermis_joint {
+  float m[3][4];
+} dermis_joint;
+
+// An axis-aligned box.
+typedef struct dermis_box {
+  float min[3], max[3];
+} dermis_box;
+
+// A morph target that is active on an instance, and its weight.
+typedef struct dermis_morph_weight {
+  uint32_t target;
+  float weight;  // finite
+} dermis_morph_weight;
+
+// What a pose promises of its joints.
+typedef enum dermis_promise {
+  DERMIS_PROMISE_SCALING = 0,        // nothing: joints may scale, shear and mirror
+  DERMIS_PROMISE_SCALE_IGNORED = 1,  // only the rotation and the translation of a joint count
+  DERMIS_PROMISE_RIGID = 2,          // joints only rotate and translate
+  DERMIS_PROMISE_INT32 = 0x7fffffff  // not a value
+} dermis_promise;
+
+// How the joints of a vertex are blended (docs/methods.md).
+typedef enum dermis_method {
+  DERMIS_METHOD_DEFAULT = 0,  // dual quaternions
+  DERMIS_METHOD_LINEAR = 1,
+  DERMIS_METHOD_DUAL_QUATERNION = 2,
+  DERMIS_METHOD_DUAL_QUATERNION_ITERATIVE = 3,  // this and the next three: for comparison
+  DERMIS_METHOD_LOG_MATRIX = 4,
+  DERMIS_METHOD_SPHERICAL_BLEND = 5,
+  DERMIS_METHOD_QUATERNION_TRANSLATION = 6,
+  DERMIS_METHOD_BLENDED = 7,
+  DERMIS_METHOD_CENTER_OF_ROTATION = 8,  // this and the next need centers of rotation
+  DERMIS_METHOD_BULGE_CONTROLLED = 9,
+  DERMIS_METHOD_INT32 = 0x7fffffff  // not a value
+} dermis_method;
+
+// ---- Meshes in the caller's memory.
+
+// How one component of an attribute is stored.
+typedef enum dermis_component {
+  DERMIS_FLOAT32 = 0,
+  DERMIS_FLOAT16 = 1,
+  DERMIS_SNORM8 = 2,
+  DERMIS_SNORM16 = 3,
+  DERMIS_UNORM8 = 4,
+  DERMIS_UNORM16 = 5,
+  DERMIS_UINT8 = 6,
+  DERMIS_UINT16 = 7,
+  DERMIS_UINT32 = 8,
+  DERMIS_COMPONENT_INT32 = 0x7fffffff  // not a value
+} dermis_component;
+
+// An attribute: one element for each vertex. Needs no alignment.
+typedef struct dermis_attribute {
+  const void* data;  // the first element; null if the mesh does not have the attribute
+  uint32_t stride;   // bytes from one element to the next; 0 if they follow each other
+  dermis_component type;
+  uint32_t components;  // per element
+} dermis_attribute;
+
+// Joints and weights of every vertex. `components` is the number of influences, the same for both.
+typedef struct dermis_influence_set {
+  dermis_attribute joints;   // uint8, uint16, uint32, or float32 with whole numbers
+  dermis_attribute weights;  // float32, unorm8 or unorm16
+} dermis_influence_set;
+
+// A morph target: displacements, which are added to the bind pose before skinning.
+typedef struct dermis_morph_target {
+  // The vertices that the elements belong to, strictly ascending; null: all vertices of the mesh.
+  const uint32_t* vertices;
+  uint32_t vertex_count;       // of `vertices`; ignored if that is null
+  dermis_attribute positions;  // float32, float16 or snorm16, × `position_scale`
+  dermis_attribute normals, tangents;
+  float position_scale[3];  // 0 0 0 counts as 1 1 1
+} dermis_morph_target;
+
+// A mesh in bind pose. Weights need not sum to 1. If a joint occurs twice in a vertex, its weights
+// are added.
+typedef struct dermis_mesh_view {
+  uint32_t size;
+  uint32_t vertex_count;
+  const char* name;  // for messages only
+  // Required. float32, float16, snorm16 or unorm16, 3 components (a fourth is ignored); multiplied
+  // by `position_scale`, then `position_offset` is added.
+  dermis_attribute positions;
+  float position_scale[3];  // 0 0 0 counts as 1 1 1
+  float position_offset[3];
+  dermis_attribute normals;                    // float32, float16, snorm8 or snorm16, 3 components
+  dermis_attribute tangents;                   // the same with 4; the fourth is the handedness
+  const dermis_influence_set* influence_sets;  // at least one
+  const dermis_morph_target* morph_targets;
+  uint32_t influence_set_count, morph_target_count;
+  // For some methods, 1 component of float32, unorm8 or unorm16, from 0 to 1:
+  dermis_attribute dual_quaternion_weights;  // for `BLENDED`; absent: 0.5
+  dermis_attribute bulge_strengths;          // for `BULGE_CONTROLLED`; absent: 1
+  dermis_attribute centers_of_rotation;      // 3 float32: `dermis_centers_of_rotation`
+} dermis_mesh_view;
+
+// ---- Import: checking, repairing, packing. Needs no device; any thread.
+
+// Kinds of problems of a mesh. `dermis_pack` refuses those up to `JOINT_OUT_OF_RANGE`;
+// `dermis_repair` fixes those from `NON_FINITE_POSITION` to `JOINT_OUT_OF_RANGE`.
+typedef enum dermis_problem {
+  DERMIS_PROBLEM_EMPTY_MESH = 0,
+  DERMIS_PROBLEM_NO_INFLUENCE_SETS = 1,
+  DERMIS_PROBLEM_COUNT_MISMATCH = 2,
+  DERMIS_PROBLEM_STRIDE_TOO_SMALL = 3,
+  DERMIS_PROBLEM_WRONG_FORMAT = 4,
+  DERMIS_PROBLEM_MORPH_VERTICES = 5,
+  DERMIS_PROBLEM_NON_FINITE_POSITION = 6,
+  DERMIS_PROBLEM_NON_FINITE_NORMAL = 7,
+  DERMIS_PROBLEM_NON_FINITE_TANGENT = 8,
+  DERMIS_PROBLEM_NON_FINITE_MORPH = 9,
+  DERMIS_PROBLEM_NON_FINITE_CENTER = 10,
+  DERMIS_PROBLEM_METHOD_WEIGHT_OUT_OF_RANGE = 11,
+  DERMIS_PROBLEM_NON_FINITE_WEIGHT = 12,
+  DERMIS_PROBLEM_NEGATIVE_WEIGHT = 13,
+  DERMIS_PROBLEM_JOINT_OUT_OF_RANGE = 14,
+  DERMIS_PROBLEM_WEIGHTS_NOT_NORMALIZED = 15,
+  DERMIS_PROBLEM_DUPLICATE_JOINT = 16,
+  DERMIS_PROBLEM_VERTEX_WITHOUT_WEIGHT = 17,
+  DERMIS_PROBLEM_UNUSED_JOINT_OUT_OF_RANGE = 18,
+  DERMIS_PROBLEM_NORMAL_LENGTH = 19,
+  DERMIS_PROBLEM_TANGENT_LENGTH = 20,
+  DERMIS_PROBLEM_TANGENT_SIGN = 21,
+  DERMIS_PROBLEM_INT32 = 0x7fffffff  // not a value
+} dermis_problem;
+
+// One kind of problem in one mesh. Strings are valid during the callback.
+typedef struct dermis_finding {
+  uint32_t size;
+  dermis_problem problem;
+  uint32_t is_refused;    // whether `dermis_pack` refuses the mesh because of it
+  uint32_t first_vertex;  // 0 if the problem is one of a view or of the whole mesh
+  uint64_t count;         // vertices, displacements or views that have it
+  const char* message;    // about the first place
+} dermis_finding;
+
+// Gets each finding. If it returns anything but `DERMIS_OK`, the function that called it stops and
+// returns that.
+typedef dermis_code (*dermis_finding_callback)(void* user, const dermis_finding* finding);
+
+// Finds all problems of a mesh. Fails with `DERMIS_INVALID_MESH`, after the last finding, if
+// `dermis_pack` refuses it. `found` may be null.
+DERMIS_C_API dermis_code dermis_validate(const dermis_mesh_view* mesh, uint32_t joint_count,
+                                         dermis_finding_callback found, void* user,
+                                         dermis_error* error);
+
+// A repaired copy of a mesh.
+typedef struct dermis_repaired dermis_repaired;
+// Drops influences that `dermis_pack` refuses, sets values that are not finite to 0, and clamps the
+// weights of methods. `view` gets the repaired mesh, which is valid until `repaired` is destroyed.
+// Fails with `DERMIS_INVALID_MESH` if a view is not valid.
+DERMIS_C_API dermis_code dermis_repair(const dermis_mesh_view* mesh, uint32_t joint_count,
+                                       dermis_mesh_view* view, dermis_repaired** repaired,
+                                       dermis_error* error);
+
+// A packed mesh: the blob that a scene needs. It can be stored with the assets.
+typedef struct dermis_packed dermis_packed;
+// Packs a mesh for a skeleton of `joint_count` joints, 1 to 65536: all joint indices must be less.
+DERMIS_C_API dermis_code dermis_pack(const dermis_mesh_view* mesh, uint32_t joint_count,
+                                     dermis_packed** packed, dermis_error* error);
+// Makes a packed mesh from stored bytes, which it copies and checks.
+DERMIS_C_API dermis_code dermis_packed_load(const void* bytes, size_t byte_count,
+                                            dermis_packed** packed, dermis_error* error);
+
+// What is known about a packed mesh.
+typedef struct dermis_packed_info {
+  uint32_t size;
+  uint32_t vertex_count;
+  const void* bytes;                        // the blob, valid as long as the packed mesh
+  uint64_t byte_count;                      // of the blob
+  uint32_t required_joints;                 // minimum joints of a pose: the largest joint index + 1
+  uint32_t max_influences, min_influences;  // of a vertex
+  uint32_t morph_target_count;
+  uint32_t has_normals, has_tangents, has_centers_of_rotation;
+} dermis_packed_info;
+DERMIS_C_API dermis_code dermis_packed_contents(const dermis_packed* packed,
+                                                dermis_packed_info* info, dermis_error* error);
+
+// Runs job(context, i) for every i below `count`, on any threads, and returns when all are done.
+// Returns `DERMIS_OK`; anything else stops the function that called it, which returns that.
+typedef dermis_code (*dermis_parallel_callback)(void* user, uint32_t count,
+                                                void (*job)(void* context, uint32_t index),
+                                                void* context);
+
+// Computes the centers of rotation of a mesh (Le and Hodgins 2016), 3 floats per vertex, once, at
+// import. `triangles` are 3 vertex indices each. The time is proportional to the number of terms,
+// pairs of vertex and triangle with two joints in common; fails with `DERMIS_LIMIT_EXCEEDED` before
+// it begins if there are more than `max_terms`, unless that is 0. `parallel` may be null.
+DERMIS_C_API dermis_code dermis_centers_of_rotation(const dermis_mesh_view* mesh,
+                                                    uint32_t joint_count, const uint32_t* triangles,
+                                                    size_t index_count, uint64_t max_terms,
+                                                    dermis_parallel_callback parallel, void* user,
+                                                    float* centers, size_t float_count,
+                                                    dermis_error* error);
+
+// ---- What is written.
+
+// The format of one attribute of skinned vertices (layout.h). Beside it, how Vulkan reads it.
+typedef enum dermis_format {
+  DERMIS_FORMAT_NONE = 0,            // the attribute is not written; for positions: FLOAT32X3
+  DERMIS_FORMAT_FLOAT32X3 = 1,       // VK_FORMAT_R32G32B32_SFLOAT
+  DERMIS_FORMAT_FLOAT32X4 = 2,       // VK_FORMAT_R32G32B32A32_SFLOAT
+  DERMIS_FORMAT_FLOAT16X3 = 3,       // from a storage buffer
+  DERMIS_FORMAT_FLOAT16X4 = 4,       // VK_FORMAT_R16G16B16A16_SFLOAT
+  DERMIS_FORMAT_SNORM16X3 = 5,       // from a storage buffer
+  DERMIS_FORMAT_SNORM16X4 = 6,       // VK_FORMAT_R16G16B16A16_SNORM; positions: relative to a box
+  DERMIS_FORMAT_SNORM8X3 = 7,        // no scene writes it
+  DERMIS_FORMAT_SNORM8X4 = 8,        // VK_FORMAT_R8G8B8A8_SNORM
+  DERMIS_FORMAT_OCTAHEDRAL16X2 = 9,  // VK_FORMAT_R16G16_SNORM, decoded by the shader
+  DERMIS_FORMAT_OCTAHEDRAL8X2 = 10,  // VK_FORMAT_R8G8_SNORM, decoded by the shader
+  DERMIS_FORMAT_INT32 = 0x7fffffff   // not a value
+} dermis_format;
+
+// The attributes of skinned vertices, as an index.
+typedef enum dermis_stream {
+  DERMIS_POSITIONS = 0,
+  DERMIS_NORMALS = 1,
+  DERMIS_TANGENTS = 2,
+  DERMIS_PREVIOUS_POSITIONS = 3,  // for motion vectors
+  DERMIS_STREAM_COUNT = 4
+} dermis_stream;
+
+// The attributes of skinned vertices and their arrangement: interleaved (position, normal, tangent,
+// previous position of a vertex, then the next vertex) or, if `is_planar`, one attribute after the
+// other.
+typedef struct dermis_layout {
+  dermis_format positions, normals, tangents;
+  uint32_t has_motion;  // whether there are previous positions
+  uint32_t is_planar;
+  uint32_t stride;  // of interleaved vertices, bytes; 0: the minimum
+} dermis_layout;
+
+// Where one attribute is: vertex v is at `offset` + v · `stride`, in bytes.
+typedef struct dermis_place {
+  uint64_t offset;
+  uint32_t stride;
+  dermis_format format;
+} dermis_place;
+
+// Where all attributes of an instance are.
+typedef struct dermis_places {
+  dermis_place streams[4];  // by `dermis_stream`
+  uint64_t byte_count;      // of all vertices
+  uint64_t alignment;       // the offset of the vertices is a multiple of this
+} dermis_places;
+
+// Places `vertex_count` vertices at byte `offset` of a buffer, which must be a multiple of
+// `alignment`.
+DERMIS_C_API dermis_code dermis_place_vertices(const dermis_layout* layout, uint32_t vertex_count,
+                                               uint64_t offset, dermis_places* places,
+                                               dermis_error* error);
+
+// ---- A scene: meshes, poses and instances, and where their vertices are. Who executes its frames
+// lends it: `dermis_recorder_scene`, `dermis_runner_scene`, `dermis_commands_scene`. In each frame:
+//
+//     dermis_begin_frame(scene, frame, completed_frame, &error);
+//     memcpy(dermis_write_pose(scene, pose, NULL, &error), joints, joint_count * sizeof *joints);
+//     ... add, remove, change ...
+//     dermis_record, or dermis_runner_jobs, or dermis_commands_plan and _commit
+//     draw from the output buffer, at dermis_instance_contents
+//
+// Functions that get a scene count as functions of the object that lends it.
+
+typedef struct dermis_scene dermis_scene;
+
+// How much a buffer holds.
+typedef struct dermis_capacity {
+  uint64_t initial;  // 0: the default
+  uint64_t maximum;  // adding more fails with `DERMIS_LIMIT_EXCEEDED`; 0: no maximum
+} dermis_capacity;
+
+// How many frames may be in flight, and how much a scene holds.
+typedef struct dermis_scene_desc {
+  uint32_t size;
+  // Frames whose fence the engine has not yet waited for when it begins a frame, the new one
+  // included. 0: 2. Ignored on the CPU.
+  uint32_t frames_in_flight;
+  dermis_capacity mesh_bytes, joints, gpu_joints, output_bytes, instances, bounds;
+} dermis_scene_desc;
+
+// Adds a mesh. The packed mesh may then be destroyed.
+DERMIS_C_API dermis_code dermis_add_mesh(dermis_scene* scene, const dermis_packed* packed,
+                                         dermis_mesh* mesh, dermis_error* error);
+// Fails if an instance uses the mesh.
+DERMIS_C_API dermis_code dermis_remove_mesh(dermis_scene* scene, dermis_mesh mesh,
+                                            dermis_error* error);
+
+// What is fixed when a pose is added.
+typedef struct dermis_pose_desc {
+  uint32_t size;
+  uint32_t joint_count;     // required: 1 to 65536
+  uint32_t written_by_gpu;  // 0: the CPU writes it, to what `dermis_write_pose` returns
+  dermis_promise promise;
+} dermis_pose_desc;
+// Adds `count` poses of the same description, all of identities until they are written. If it
+// fails, it adds none.
+DERMIS_C_API dermis_code dermis_add_poses(dermis_scene* scene, const dermis_pose_desc* desc,
+                                          uint32_t count, dermis_pose* poses, dermis_error* error);
+// Fails if an instance uses the pose.
+DERMIS_C_API dermis_code dermis_remove_pose(dermis_scene* scene, dermis_pose pose,
+                                            dermis_error* error);
+
+// An instance.
+typedef struct dermis_instance_desc {
+  uint32_t size;
+  dermis_method method;
+  dermis_mesh mesh;  // required
+  dermis_pose pose;  // required
+  dermis_layout layout;
+  dermis_box box;            // for positions in snorm16
+  uint32_t wants_bounds;     // whether to compute the exact box of the skinned positions
+  uint32_t update_interval;  // skinned every N-th frame; 0: 1
+  uint32_t culled_on_gpu;    // whether a word of the visibility buffer decides, too
+} dermis_instance_desc;
+// Adds an instance, which the next frame skins.
+DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
+                                             dermis_instance* instance, dermis_error* error);
+DERMIS_C_API dermis_code dermis_remove_instance(dermis_scene* scene, dermis_instance instance,
+                                                dermis_error* error);
+
+// Begins frame number `frame`, counted from 1; numbers may be skipped. `completed_frame` is the
+// newest frame that the GPU has completed, or 0; on the CPU, the frame before is complete.
+DERMIS_C_API dermis_code dermis_begin_frame(dermis_scene* scene, uint64_t frame,
+                                            uint64_t completed_frame, dermis_error* error);
+// Returns memory for the joint matrices of a pose in this frame, or null if it fails. The engine
+// writes all of it before the frame is executed, on any thread, and never reads it. `joint_count`
+// may be null.
+DERMIS_C_API dermis_joint* dermis_write_pose(dermis_scene* scene, dermis_pose pose,
+                                             uint32_t* joint_count, dermis_error* error);
+// States that a GPU pass of the engine writes these poses before the commands of this frame. If
+// one fails, those before it are marked.
+DERMIS_C_API dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses,
+                                             uint32_t count, dermis_error* error);
+
+// Which members of a `dermis_change` count. Combine them by |.
+typedef enum dermis_change_bits {
+  DERMIS_CHANGE_VISIBLE = 1,
+  DERMIS_CHANGE_UPDATE_INTERVAL = 2,
+  DERMIS_CHANGE_MESH = 4,
+  DERMIS_CHANGE_POSE = 8,
+  DERMIS_CHANGE_METHOD = 16,  // `dermis_prepare` must have been called for it
+  DERMIS_CHANGE_BOX = 32,
+  DERMIS_CHANGE_MORPHS = 64,
+  DERMIS_CHANGE_TELEPORT = 128  // previous positions are set to the current ones
+} dermis_change_bits;
+// What changes about an instance.
+typedef struct dermis_change {
+  uint32_t size;
+  uint32_t what;  // of `dermis_change_bits`
+  dermis_instance instance;
+  uint32_t visible;
+  uint32_t update_interval;
+  dermis_method method;
+  dermis_mesh mesh;
+  dermis_pose pose;
+  dermis_box box;
+  const dermis_morph_weight* morphs;  // the active targets; they are copied
+  uint32_t morph_count;
+} dermis_change;
+// Applies changes, one after the other. If one fails, those before it remain, those after it are
+// not applied, and the message begins with its index.
+DERMIS_C_API dermis_code dermis_change_instances(dermis_scene* scene, const dermis_change* changes,
+                                                 uint32_t count, dermis_error* error);
+
+// Moves outputs from the end of the output buffer into free ranges, at most `max_bytes`; `moved`
+// gets how many bytes, and may be null.
+DERMIS_C_API dermis_code dermis_compact(dermis_scene* scene, uint64_t max_bytes, uint64_t* moved,
+                                        dermis_error* error);
+// States that the frame that was executed last will never reach the GPU, or that none of its jobs
+// is run. The scene is then as after `dermis_begin_frame`; everything is skinned again.
+DERMIS_C_API dermis_code dermis_abandon_frame(dermis_scene* scene, uint64_t frame,
+                                              dermis_error* error);
+
+// An instance, as of the last frame that was executed.
+typedef struct dermis_instance_info {
+  uint32_t size;
+  uint32_t is_written;        // whether vertices are there
+  uint32_t is_due;            // whether this frame skins it if its pose is written
+  uint32_t visibility_index;  // of its word in the visibility buffer
+  dermis_mesh mesh;           // that it was last skinned with
+  uint32_t has_bounds;        // whether `bounds` is known
+  dermis_box bounds;          // exact, of the newest complete frame that skinned it
+  uint64_t offset;            // bytes from the beginning of the output buffer
+  dermis_places places;       // offsets count from the beginning of the output buffer
+} dermis_instance_info;
+DERMIS_C_API dermis_code dermis_instance_contents(const dermis_scene* scene,
+                                                  dermis_instance instance,
+                                                  dermis_instance_info* info, dermis_error* error);
+
+// Indices of a mesh in the index buffer of the engine.
+typedef struct dermis_index_range {
+  uint32_t first, count;
+} dermis_index_range;
+// VkDrawIndexedIndirectCommand.
+typedef struct dermis_indexed_draw {
+  uint32_t index_count;
+  uint32_t instance_count;  // 1, or 0 if vertices are not there
+  uint32_t first_index;
+  int32_t vertex_offset;  // the first vertex of the instance in the output buffer
+  uint32_t first_instance;
+} dermis_indexed_draw;
+// Fills `count` draws, one for each instance, for one indirect draw from the beginning of the
+// output buffer. `ranges` are those of all meshes, by dermis_mesh::index. All layouts must be
+// interleaved and have the same stride.
+DERMIS_C_API dermis_code dermis_indexed_draws(const dermis_scene* scene,
+                                              const dermis_instance* instances, uint32_t count,
+                                              const dermis_index_range* ranges,
+                                              uint32_t range_count, dermis_indexed_draw* draws,
+                                              dermis_error* error);
+
+// Bytes of one buffer of a scene.
+typedef struct dermis_store {
+  uint64_t capacity, used, largest_free;
+} dermis_store;
+// What the last frame did. Lists are valid until the next call of a function of the scene.
+typedef struct dermis_scene_info {
+  uint32_t size;
+  uint32_t instances;              // in the scene
+  uint64_t frame;                  // that was begun last
+  const dermis_instance* skinned;  // instances that were skinned, without those culled on the GPU
+  const dermis_instance* settled;  // of which only previous positions were written
+  uint32_t skinned_count, settled_count;
+  uint32_t converted_poses;
+  uint32_t visibility_count;  // words of the visibility buffer
+  uint64_t skinned_vertices, written_bytes, moved_bytes, pose_bytes;
+  // What the visibility kernel counted in the newest complete frame.
+  uint64_t completed_frame;
+  uint32_t culled_candidates, gpu_visible, gpu_skinned, gpu_settled;
+  dermis_store meshes, palettes, outputs;
+} dermis_scene_info;
+DERMIS_C_API dermis_code dermis_scene_contents(dermis_scene* scene, dermis_scene_info* info,
+                                               dermis_error* error);
+
+// ---- The CPU: runs the frames of a scene by SIMD instructions, without Vulkan.
+
+typedef struct dermis_runner dermis_runner;
+// What a runner needs to know.
+typedef struct dermis_runner_desc {
+  uint32_t size;
+  const dermis_scene_desc* scene;  // null: the defaults
+  // Optional: memory of the engine for the output, which must outlive the runner, and does not
+  // grow.
+  void* output;
+  size_t output_byte_count;
+} dermis_runner_desc;
+// `desc` may be null.
+DERMIS_C_API dermis_code dermis_runner_create(const dermis_runner_desc* desc,
+                                              dermis_runner** runner, dermis_error* error);
+// Valid until the runner is destroyed. Null if `runner` is null.
+DERMIS_C_API dermis_scene* dermis_runner_scene(dermis_runner* runner);
+
+// The jobs of a frame.
+typedef struct dermis_runner_frame {
+  uint32_t size;
+  uint32_t job_count;
+  const void* output;  // all vertices, once the jobs are done; valid until the next frame
+  uint64_t output_byte_count;
+} dermis_runner_frame;
+// Lists the jobs for everything that changed. Call it once after each `dermis_begin_frame` and
+// `dermis_abandon_frame`. Until the jobs are done, no other function of the runner or its scene may
+// be called. `vertices_per_job`: 0 is the default, 65536.
+DERMIS_C_API dermis_code dermis_runner_jobs(dermis_runner* runner, uint32_t vertices_per_job,
+                                            dermis_runner_frame* frame, dermis_error* error);
+// Runs job number `index` of the frame. The jobs of a frame may run on any threads, in any order
+// and at the same time, each once.
+DERMIS_C_API dermis_code dermis_run_job(const dermis_runner* runner, uint32_t index,
+                                        dermis_error* error);
+
+// ---- Commands: a batch that the engine keeps the books of, or a scene for an engine with its own
+// RHI. `dermis_record_plan` records those of a batch.
+
+// Limits of a device (plan.h). 0: what every Vulkan device has. `dermis_context_create` fills them.
+typedef struct dermis_limits {
+  uint32_t size;
+  uint32_t min_storage_buffer_offset_alignment;
+  uint64_t max_storage_buffer_range;
+  uint32_t max_workgroup_count_x, max_workgroup_count_y;
+  uint32_t max_storage_buffers_per_stage;
+  uint32_t one_output_range;       // whether a dispatch can bind only one window of the output
+  uint32_t texel_buffers;          // whether kernels are those for CPU devices
+  uint32_t staged_stores;          // whether kernels store interleaved vertices widely
+  uint32_t no_comparison_methods;  // whether kernels of methods for comparison are missing
+} dermis_limits;
+// How work is divided; it affects speed only. 0: the default.
+typedef struct dermis_tuning {
+  uint32_t size;
+  uint32_t workgroup_size;            // 64; a power of two from 8 to 128
+  uint32_t instances_per_invocation;  // 4; 1 to 32
+  uint32_t min_workgroups;
+  uint32_t vertices_per_invocation;  // 1; a power of two up to 16
+} dermis_tuning;
+
+// A pose of a batch: consecutive `dermis_joint` in the poses buffer.
+typedef struct dermis_batch_pose {
+  uint64_t matrix_offset;  // bytes, a multiple of 16
+  uint32_t joint_count;
+  dermis_promise promise;
+} dermis_batch_pose;
+// An instance of a batch.
+typedef struct dermis_job {
+  uint32_t size;
+  uint32_t pose;                   // index into `dermis_batch::poses`
+  const dermis_packed_info* mesh;  // required: what `dermis_packed_contents` filled
+  uint64_t mesh_offset;            // bytes into the mesh buffer, a multiple of 16
+  dermis_places places;            // of `dermis_place_vertices`
+  dermis_method method;
+  dermis_box box;            // for positions in snorm16
+  uint32_t wants_bounds;     // whether the box of the positions is written to the results buffer
+  uint32_t restarts_motion;  // whether previous positions become the current ones
+  uint32_t settles;          // whether only that is done
+  uint32_t morph_count;
+  const dermis_morph_weight* morphs;
+} dermis_job;
+// Everything that one `dermis_record_plan` skins.
+typedef struct dermis_batch {
+  uint32_t size;
+  uint32_t pose_count, job_count;
+  uint32_t has_separate_outputs;  // whether attributes have different output buffers
+  const dermis_batch_pose* poses;
+  const dermis_job* jobs;
+  uint64_t mesh_bytes, pose_bytes;  // of these buffers
+  uint64_t output_bytes[4];         // of the output buffer of each attribute
+} dermis_batch;
+
+// The buffers of a batch or a scene.
+typedef enum dermis_buffer_role {
+  DERMIS_BUFFER_MESHES = 0,
+  DERMIS_BUFFER_POSES = 1,
+  DERMIS_BUFFER_TABLES = 2,
+  DERMIS_BUFFER_PALETTES = 3,
+  DERMIS_BUFFER_RESULTS = 4,  // of a batch, for each job with results: 6 words of its box, see
+                              // `InstanceResult` in plan.h, its clamped vertices, and 0
+  DERMIS_BUFFER_OUTPUT = 5,   // positions; in a scene, and usually in a batch, all attributes
+  DERMIS_BUFFER_NORMALS = 6,
+  DERMIS_BUFFER_TANGENTS = 7,
+  DERMIS_BUFFER_PREVIOUS_POSITIONS = 8,
+  DERMIS_BUFFER_GPU_POSES = 9,  // this and the next three: only in a scene
+  DERMIS_BUFFER_READ_BACK = 10,
+  DERMIS_BUFFER_VISIBILITY = 11,
+  DERMIS_BUFFER_HISTORY = 12,
+  DERMIS_BUFFER_ROLE_COUNT = 13
+} dermis_buffer_role;
+// What a buffer needs.
+typedef struct dermis_requirement {
+  uint64_t byte_count;
+  uint32_t alignment;  // of its offset, if it is a part of a larger buffer
+  uint32_t usage;      // VkBufferUsageFlags; the engine adds its own
+} dermis_requirement;
+
+// The number of a buffer in commands: in a batch its `dermis_buffer_role`, in a scene
+// dermis_scene_buffer::number, or 0 for the visibility buffer.
+enum { DERMIS_VISIBILITY_BUFFER = 0 };
+// A part of a buffer.
+typedef struct dermis_part {
+  uint64_t offset, byte_count;
+  uint32_t buffer;  // its number
+} dermis_part;
+// A descriptor of descriptor set 0.
+typedef struct dermis_binding {
+  dermis_part part;
+  uint32_t slot;
+  uint32_t is_texel_buffer;  // uniform, VK_FORMAT_R32G32B32A32_UINT; otherwise a storage buffer
+} dermis_binding;
+
+typedef enum dermis_command_kind {
+  DERMIS_DISPATCH = 0,               // bind the pipeline, push the constants, dispatch
+  DERMIS_UPLOAD = 1,                 // copy `bytes` to a part, for example by a staging buffer
+  DERMIS_COPY = 2,                   // vkCmdCopyBuffer
+  DERMIS_CLEAR = 3,                  // vkCmdFillBuffer with zeros
+  DERMIS_BARRIER = 4,                // a memory barrier between two uses
+  DERMIS_COMMAND_INT32 = 0x7fffffff  // not a value
+} dermis_command_kind;
+typedef struct dermis_dispatch {
+  uint64_t pipeline;                      // `dermis_describe_pipeline`
+  uint32_t group_count_x, group_count_y;  // 0 if indirect
+  uint32_t is_indirect;
+  uint32_t constant_count;
+  uint64_t indirect_offset;  // of the arguments, in bytes from the beginning of the buffer of
+                             // bindings[0]
+  const dermis_binding* bindings;
+  uint32_t binding_count;
+  uint32_t constants[9];  // push constants from offset 0
+} dermis_dispatch;
+typedef struct dermis_upload {
+  dermis_part to;
+  const void* bytes;
+} dermis_upload;
+typedef struct dermis_copy {
+  uint32_t from, to;  // numbers of buffers
+  uint64_t from_offset, to_offset, byte_count;
+} dermis_copy;
+typedef struct dermis_barrier_uses {
+  uint32_t before, after;  // of `dermis_use`
+} dermis_barrier_uses;
+// One command: the member of `as` that `kind` says.
+typedef struct dermis_command {
+  dermis_command_kind kind;
+  union {
+    dermis_dispatch dispatch;
+    dermis_upload upload;
+    dermis_copy copy;
+    dermis_part clear;
+    dermis_barrier_uses barrier;
+  } as;
+} dermis_command;
+
+typedef struct dermis_plan dermis_plan;
+// Turns a batch into commands. If *plan is null, a plan is created; otherwise it is filled again.
+// If the function fails, an existing plan is empty.
+DERMIS_C_API dermis_code dermis_make_plan(const dermis_batch* batch, const dermis_limits* limits,
+                                          const dermis_tuning* tuning, dermis_plan** plan,
+                                          dermis_error* error);
+// The contents of a plan, valid until it is filled again or destroyed.
+typedef struct dermis_plan_info {
+  uint32_t size;
+  uint32_t command_count;
+  const dermis_command* commands;
+  const uint64_t* pipelines;  // of the dispatches, each once
+  // Byte offset in the results buffer of the first job with results; the others follow in the order
+  // of the jobs, 32 bytes each.
+  uint64_t first_result;
+  uint32_t pipeline_count;
+  uint32_t dispatch_count;
+  dermis_requirement buffers[9];  // by `dermis_buffer_role`
+} dermis_plan_info;
+DERMIS_C_API dermis_code dermis_plan_contents(const dermis_plan* plan, dermis_plan_info* info,
+                                              dermis_error* error);
+// Writes the tables that the kernels read: as many bytes as the tables buffer needs.
+DERMIS_C_API dermis_code dermis_write_tables(const dermis_plan* plan, void* bytes,
+                                             size_t byte_count, dermis_error* error);
+
+// Lists the pipelines that instances like this one can need, at most `capacity`; `count` gets how
+// many there are. With a scene and valid handles, only for the same kind of mesh and pose; without
+// (`scene` may be null), for any. For an engine with its own RHI; others call `dermis_prepare`.
+DERMIS_C_API dermis_code dermis_list_pipelines(const dermis_scene* scene,
+                                               const dermis_instance_desc* desc,
+                                               const dermis_limits* limits,
+                                               const dermis_tuning* tuning, uint64_t* pipelines,
+                                               uint32_t capacity, uint32_t* count,
+                                               dermis_error* error);
+// What a compute pipeline is built from. The SPIR-V is static.
+typedef struct dermis_pipeline_info {
+  uint32_t size;
+  uint32_t word_count;
+  const uint32_t* spirv;   // SPIR-V 1.3, entry point "main"
+  char module[64];         // its name
+  uint32_t constants[32];  // specialization constants from id 0 on
+  uint32_t constant_count;
+  uint32_t storage_buffers, texel_buffers;  // in slots from 0 on, one kind after the other
+} dermis_pipeline_info;
+DERMIS_C_API dermis_code dermis_describe_pipeline(uint64_t pipeline, dermis_pipeline_info* info,
+                                                  dermis_error* error);
+
+// A buffer that a scene asks for.
+typedef struct dermis_scene_buffer {
+  uint32_t size;
+  uint32_t number;  // by which commands name it
+  dermis_buffer_role role;
+  uint32_t is_mapped;  // whether the scene writes or reads it through a mapping, if it gets one
+  dermis_requirement requirement;
+} dermis_scene_buffer;
+// What commands need to know.
+typedef struct dermis_commands_desc {
+  uint32_t size;
+  const dermis_scene_desc* scene;  // null: the defaults
+  const dermis_limits* limits;     // null: those that every Vulkan device has
+  const dermis_tuning* tuning;     // null: the default
+  uint64_t output_offset;          // of the output, if it is a part of a larger buffer
+  void* user;
+  // Required. Creates a buffer; `mapped` gets the address of its first byte, or null. If it fails,
+  // the scene may ask for a smaller one.
+  dermis_code (*create_buffer)(void* user, const dermis_scene_buffer* buffer, void** mapped,
+                               dermis_error* error);
+  // Required. Releases a buffer that no frame in flight uses.
+  void (*release_buffer)(void* user, uint32_t number);
+} dermis_commands_desc;
+// Owns a scene, and lists the commands of its frames.
+typedef struct dermis_commands dermis_commands;
+DERMIS_C_API dermis_code dermis_commands_create(const dermis_commands_desc* desc,
+                                                dermis_commands** commands, dermis_error* error);
+// Valid until the commands are destroyed. Null if `commands` is null.
+DERMIS_C_API dermis_scene* dermis_commands_scene(dermis_commands* commands);
+// Lists the commands for everything that changed since the last `dermis_commands_commit`. They are
+// valid until the next call of a function of the scene or of this object.
+DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands,
+                                              const dermis_command** list, uint32_t* count,
+                                              dermis_error* error);
+// States that the commands of the last plan have been recorded. `output_buffer` gets the number of
+// the output buffer, and may be null.
+DERMIS_C_API dermis_code dermis_commands_commit(dermis_commands* commands, uint32_t* output_buffer,
+                                                dermis_error* error);
+// For read-back buffers that are not mapped: reads the results of a complete frame.
+DERMIS_C_API dermis_code dermis_commands_read_back(dermis_commands* commands, uint64_t frame,
+                                                   const void* bytes, size_t byte_count,
+                                                   dermis_error* error);
+// Where a GPU pass of the engine writes the joint matrices of a pose.
+DERMIS_C_API dermis_code dermis_commands_pose_part(const dermis_commands* commands,
+                                                   dermis_pose pose, dermis_part* part,
+                                                   dermis_error* error);
+
+// How a buffer is used before or after Dermis. Combine uses by |.
+typedef enum dermis_use {
+  DERMIS_USE_DERMIS = 1,
+  DERMIS_USE_VERTEX_INPUT = 2,
+  DERMIS_USE_VERTEX_SHADER = 4,
+  DERMIS_USE_FRAGMENT_SHADER = 8,
+  DERMIS_USE_TASK_SHADER = 16,
+  DERMIS_USE_MESH_SHADER = 32,
+  DERMIS_USE_RAY_TRACING = 64,
+  DERMIS_USE_ACCELERATION_STRUCTURE_BUILD = 128,
+  DERMIS_USE_COMPUTE_READ = 256,
+  DERMIS_USE_COMPUTE_WRITE = 512,
+  DERMIS_USE_COPY_READ = 1024,
+  DERMIS_USE_COPY_WRITE = 2048,
+  DERMIS_USE_HOST_READ = 4096,
+  DERMIS_USE_HOST_WRITE = 8192,
+  DERMIS_USE_INDIRECT_READ = 16384
+} dermis_use;
+
+// ---- glTF. In a build without it, `dermis_model_load` fails with `DERMIS_MISSING_FEATURE`.
+
+// What is computed for primitives without normals.
+typedef enum dermis_missing_normals {
+  DERMIS_NORMALS_LEAVE = 0,
+  DERMIS_NORMALS_SMOOTH = 1,
+  DERMIS_NORMALS_FLAT = 2,           // as glTF demands; vertices are repeated
+  DERMIS_NORMALS_INT32 = 0x7fffffff  // not a value
+} dermis_missing_normals;
+// What to load, and how. Strings are UTF-8.
+typedef struct dermis_model_source {
+  uint32_t size;
+  uint32_t is_strict;  // whether a broken rule is an error even if the meaning is clear
+  const char* path;    // of a .gltf or .glb file; or null, and
+  const void* bytes;   // the file in memory,
+  size_t byte_count;
+  const char* folder;      // and the folder of the files that it names; null: there are none
+  const char* clips_path;  // optional: a file whose clips are added, for nodes of the same names
+  uint32_t rigid_meshes;   // whether to read rigid meshes that hang on a skeleton
+  dermis_missing_normals missing_normals;
+} dermis_model_source;
+typedef struct dermis_model dermis_model;
+DERMIS_C_API dermis_code dermis_model_load(const dermis_model_source* source, dermis_model** model,
+                                           dermis_error* error);
+
+typedef struct dermis_clip {
+  const char* name;
+  double duration;  // seconds
+} dermis_clip;
+// What a model has, valid as long as it is.
+typedef struct dermis_model_info {
+  uint32_t size;
+  uint32_t primitive_count;  // skinned primitives of the default scene
+  uint32_t clip_count;
+  uint32_t note_count;
+  const dermis_clip* clips;
+  const char* const* notes;  // what was fixed or left out, one sentence each
+} dermis_model_info;
+DERMIS_C_API dermis_code dermis_model_contents(const dermis_model* model, dermis_model_info* info,
+                                               dermis_error* error);
+
+// A skinned primitive. Pointers are valid as long as the model.
+typedef struct dermis_primitive {
+  uint32_t size;
+  uint32_t skin;         // primitives with the same number have the same pose
+  uint32_t joint_count;  // of its poses
+  // For `dermis_validate` and `dermis_pack`. Without influence sets it stays in bind pose.
+  const dermis_mesh_view* mesh;
+  const uint32_t* triangles;  // 3 vertex indices each
+  size_t index_count;
+  const float* texcoords;  // TEXCOORD_0, 2 per vertex, or null
+  const float* colors;     // COLOR_0, 4 per vertex, or null
+  float base_color[4];     // of its material, linear
+} dermis_primitive;
+DERMIS_C_API dermis_code dermis_model_primitive(const dermis_model* model, uint32_t index,
+                                                dermis_primitive* primitive, dermis_error* error);
+
+enum { DERMIS_REST_POSE = 0x7fffffff };  // as a clip
+// The joint matrices of a primitive at a time of a clip, in seconds, which is clamped; and the
+// weights of its morph targets, unless `morph_weights` is null. The counts must be those of the
+// primitive and of its mesh view.
+DERMIS_C_API dermis_code dermis_model_pose(const dermis_model* model, uint32_t primitive,
+                                           uint32_t clip, double time, dermis_joint* joints,
+                                           uint32_t joint_count, float* morph_weights,
+                                           uint32_t morph_weight_count, dermis_error* error);
+
+// ---- Vulkan. Define DERMIS_VULKAN, or include vulkan_core.h before. No loader is linked.
+
+#ifdef VULKAN_CORE_H_
+
+// Stages and accesses of both sides of a barrier.
+typedef struct dermis_barrier {
+  VkPipelineStageFlags source_stages;
+  VkAccessFlags source_accesses;
+  VkPipelineStageFlags destination_stages;
+  VkAccessFlags destination_accesses;
+} dermis_barrier;
+// Which half of a queue-family ownership transfer a barrier is.
+typedef enum dermis_transfer {
+  DERMIS_TRANSFER_NONE = 0,
+  DERMIS_TRANSFER_RELEASE = 1,
+  DERMIS_TRANSFER_ACQUIRE = 2,
+  DERMIS_TRANSFER_INT32 = 0x7fffffff  // not a value
+} dermis_transfer;
+// The barrier between two uses, each of `dermis_use`, for engines that record it themselves.
+DERMIS_C_API dermis_code dermis_barrier_between(uint32_t before, uint32_t after,
+                                                dermis_transfer transfer, dermis_barrier* barrier,
+                                                dermis_error* error);
+
+// Answers of the engine to a question for which Dermis has a default.
+typedef enum dermis_choice {
+  DERMIS_CHOICE_DEFAULT = 0,
+  DERMIS_CHOICE_NO = 1,
+  DERMIS_CHOICE_YES = 2,
+  DERMIS_CHOICE_INT32 = 0x7fffffff  // not a value
+} dermis_choice;
+// The engine's device and what the engine enabled on it (vulkan/context.h).
+typedef struct dermis_device_desc {
+  uint32_t size;
+  uint32_t api_version;                              // required: the lower of instance and device
+  VkInstance instance;                               // required
+  VkPhysicalDevice physical_device;                  // required
+  VkDevice device;                                   // required
+  PFN_vkGetInstanceProcAddr get_instance_proc_addr;  // required
+  const char* const* extensions;                     // enabled
+  const void* features;                              // pNext chain of VkDeviceCreateInfo, or null
+  uint32_t extension_count;
+  uint32_t has_scalar_block_layout;  // whether these features are enabled, without the chain
+  uint32_t has_shader_int64;
+  dermis_choice texel_buffers;  // whether kernels are those for CPU devices
+  dermis_choice staged_stores;  // whether kernels may store interleaved vertices widely
+  VkPipelineCache pipeline_cache;
+  const VkAllocationCallbacks* allocator;  // must outlive the context
+  // Optional: the engine's own build of the kernels. `words` must stay valid until the next call in
+  // the same thread.
+  void* user;
+  dermis_code (*get_kernel)(void* user, const char* module, const uint32_t** words,
+                            size_t* word_count, dermis_error* error);
+} dermis_device_desc;
+// Layouts and pipelines on one device. Destroy it before the device, and after what uses it.
+typedef struct dermis_context dermis_context;
+// `limits` and `tuning` are for batches, and may be null.
+DERMIS_C_API dermis_code dermis_context_create(const dermis_device_desc* desc,
+                                               dermis_limits* limits, dermis_tuning* tuning,
+                                               dermis_context** context, dermis_error* error);
+// Builds every pipeline that instances like this one can need; `scene` and `desc` as for
+// `dermis_list_pipelines`. May take long. Without a scene, any thread may call it.
+DERMIS_C_API dermis_code dermis_prepare(const dermis_context* context, const dermis_scene* scene,
+                                        const dermis_instance_desc* desc, dermis_error* error);
+// Records a barrier for all memory between two uses. Call it outside a render pass.
+DERMIS_C_API dermis_code dermis_record_barrier(const dermis_context* context,
+                                               VkCommandBuffer command_buffer, uint32_t before,
+                                               uint32_t after, dermis_error* error);
+
+// A part of a buffer.
+typedef struct dermis_range {
+  VkBuffer buffer;
+  VkDeviceSize offset;
+  VkDeviceSize byte_count;  // a multiple of 4
+} dermis_range;
+// The buffers of a batch; what no job needs may be left out.
+typedef struct dermis_batch_buffers {
+  uint32_t size;
+  dermis_range meshes, poses, tables, palettes, results;
+  dermis_range outputs[4];  // by `dermis_stream`; the same four times if attributes share one
+} dermis_batch_buffers;
+// Descriptor sets for a set of buffers. Destroy them before the buffers and the context, once the
+// GPU has completed what was recorded with them.
+typedef struct dermis_bindings dermis_bindings;
+DERMIS_C_API dermis_code dermis_bindings_create(const dermis_context* context,
+                                                const dermis_batch_buffers* buffers,
+                                                dermis_bindings** bindings, dermis_error* error);
+// Records the commands of a plan. The engine records the barriers before and after.
+DERMIS_C_API dermis_code dermis_record_plan(const dermis_context* context,
+                                            VkCommandBuffer command_buffer, const dermis_plan* plan,
+                                            const dermis_bindings* bindings, dermis_error* error);
+
+// Who uses the memory of a buffer.
+typedef enum dermis_memory_use {
+  DERMIS_MEMORY_DEVICE = 0,         // the GPU
+  DERMIS_MEMORY_UPLOAD = 1,         // the CPU writes, the GPU reads: mapped, host-coherent
+  DERMIS_MEMORY_READ_BACK = 2,      // the GPU writes, the CPU reads: mapped, host-coherent
+  DERMIS_MEMORY_INT32 = 0x7fffffff  // not a value
+} dermis_memory_use;
+// A buffer with its memory.
+typedef struct dermis_created_buffer {
+  VkBuffer buffer;
+  void* mapped;
+  void* allocation;  // for `destroy_buffer`
+} dermis_created_buffer;
+// What a recorder needs to know. Ranges are optional parts of the engine's buffers; they do not
+// grow. `dermis_recorder_requirement` says what they need.
+typedef struct dermis_recorder_desc {
+  uint32_t size;
+  VkBufferUsageFlags output_usage;  // 0: VK_BUFFER_USAGE_VERTEX_BUFFER_BIT
+  const dermis_scene_desc* scene;   // null: the defaults
+  const dermis_tuning* tuning;      // null: that of the context
+  dermis_range meshes, poses, gpu_poses, output;
+  void* mapped_poses;          // address of the first byte of `poses`
+  uint32_t measures_gpu_time;  // by timestamps
+  // The engine's allocator: both or none. `name` is static.
+  void* user;
+  dermis_code (*create_buffer)(void* user, const VkBufferCreateInfo* info, dermis_memory_use use,
+                               const char* name, dermis_created_buffer* buffer,
+                               dermis_error* error);
+  void (*destroy_buffer)(void* user, const dermis_created_buffer* buffer);
+} dermis_recorder_desc;
+// What a range that is given to `dermis_recorder_create` needs: usage, alignment, and the size for
+// the initial capacity. `role` is MESHES, POSES, GPU_POSES or OUTPUT. `layouts` are those of the
+// instances, and may be null.
+DERMIS_C_API dermis_code dermis_recorder_requirement(
+    const dermis_context* context, const dermis_recorder_desc* desc, dermis_buffer_role role,
+    const dermis_layout* layouts, uint32_t layout_count, dermis_requirement* requirement,
+    dermis_error* error);
+// Owns a scene and its buffers, and records its frames. Destroy it once the GPU has completed them.
+typedef struct dermis_recorder dermis_recorder;
+// `desc` may be null.
+DERMIS_C_API dermis_code dermis_recorder_create(const dermis_context* context,
+                                                const dermis_recorder_desc* desc,
+                                                dermis_recorder** recorder, dermis_error* error);
+// Valid until the recorder is destroyed. Null if `recorder` is null.
+DERMIS_C_API dermis_scene* dermis_recorder_scene(dermis_recorder* recorder);
+// Records the frame, outside a render pass. `visibility` is the buffer of visibility words, if
+// instances are culled on the GPU; otherwise VK_NULL_HANDLE.
+DERMIS_C_API dermis_code dermis_record(dermis_recorder* recorder, VkCommandBuffer command_buffer,
+                                       VkBuffer visibility, VkDeviceSize visibility_offset,
+                                       dermis_error* error);
+// As of the last frame that was recorded.
+typedef struct dermis_recorder_info {
+  uint32_t size;
+  uint32_t dispatches;
+  VkBuffer output_buffer;      // offsets of outputs count from its beginning
+  uint64_t output_generation;  // changes when `output_buffer` becomes another one
+  uint64_t workgroups, uploaded_bytes, device_memory;
+  double plan_seconds, record_seconds;
+  double gpu_seconds;  // of the newest complete frame; negative if it was not measured
+} dermis_recorder_info;
+DERMIS_C_API dermis_code dermis_recorder_contents(const dermis_recorder* recorder,
+                                                  dermis_recorder_info* info, dermis_error* error);
+// Where a GPU pass of the engine writes the joint matrices of a pose.
+DERMIS_C_API dermis_code dermis_pose_range(const dermis_recorder* recorder, dermis_pose pose,
+                                           dermis_range* range, dermis_error* error);
+
+#endif  // VULKAN_CORE_H_
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,82 @@
+// The C interface of the reference: the library `dermis_compare`. C99. It says whether skinned
+// vertices are right, and is for tests and debug builds: it is written to be correct, not fast. The
+// rules of dermis.h hold. verify.h describes the reference and the bounds.
+#ifndef DERMIS_DERMIS_COMPARE_H
+#define DERMIS_DERMIS_COMPARE_H
+
+#include "dermis/dermis.h"
+
+#if defined(DERMIS_STATIC) || defined(DERMIS_CDEF)
+#define DERMIS_COMPARE_API
+#elif defined(_WIN32) && defined(DERMIS_BUILDS_C_COMPARE)
+#define DERMIS_COMPARE_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define DERMIS_COMPARE_API __declspec(dllimport)
+#else
+#define DERMIS_COMPARE_API __attribute__((visibility("default")))
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// A mesh in a pose.
+typedef struct dermis_posed_mesh {
+  uint32_t size;
+  uint32_t joint_count;
+  const dermis_mesh_view* mesh;  // required; one that `dermis_pack` accepts
+  const dermis_joint* joints;    // required
+  const dermis_morph_weight* morphs;
+  uint32_t morph_count;
+  dermis_method method;
+} dermis_posed_mesh;
+
+// Skins a mesh in double precision: 3 numbers for each position and normal, 4 for each tangent. The
+// counts are those of the numbers. Null: not wanted. Fails if the mesh has no normals or tangents
+// that are wanted.
+DERMIS_COMPARE_API dermis_code dermis_reference_skin(const dermis_posed_mesh* posed,
+                                                     double* positions, size_t position_count,
+                                                     double* normals, size_t normal_count,
+                                                     double* tangents, size_t tangent_count,
+                                                     dermis_error* error);
+
+// One attribute of skinned vertices in memory. Needs no alignment.
+typedef struct dermis_skinned_attribute {
+  const void* data;  // of vertex 0; null if it is absent
+  uint32_t stride;   // bytes
+  dermis_format format;
+} dermis_skinned_attribute;
+// The vertices that are compared.
+typedef struct dermis_skinned_view {
+  uint32_t size;
+  uint32_t vertex_count;
+  dermis_skinned_attribute positions;  // required
+  dermis_skinned_attribute normals, tangents;
+  dermis_box box;  // of positions in snorm16
+} dermis_skinned_view;
+
+// The result of a comparison. Errors are divided by the bound of their vertex (docs/accuracy.md),
+// so that 1 is the largest permitted.
+typedef struct dermis_comparison {
+  uint32_t size;
+  uint32_t passed;  // whether every vertex is within its bound
+  double worst_position, worst_normal, worst_tangent;
+  double largest_position_error;  // not divided, in the units of the pose
+  uint64_t compared;              // vertices that were compared with their bound
+  uint64_t failures;              // of them, outside it
+  // Vertices without a bound: those whose joints are singular or antipodal, which must be finite;
+  // those whose joints are not finite; and those whose numbers are out of range.
+  uint64_t only_finite, skipped, out_of_range;
+  uint32_t worst_position_vertex;
+  uint32_t first_failure;
+} dermis_comparison;
+// Skins a mesh in double precision, and compares every vertex with it. If vertices are wrong, it
+// succeeds, and `passed` is 0.
+DERMIS_COMPARE_API dermis_code dermis_compare(const dermis_posed_mesh* posed,
+                                              const dermis_skinned_view* skinned,
+                                              dermis_comparison* comparison, dermis_error* error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,85 @@
+// The reference. A library of its own, so that no engine has to ship it.
+#include "dermis/dermis_compare.h"
+
+#include <algorithm>
+
+#include "convert.h"
+#include "dermis/verify.h"
+
+using namespace dermis;
+using namespace dermis::c;
+
+namespace {
+
+/// A mesh in a pose, skinned by the reference.
+reference::SkinnedMesh skin(const dermis_posed_mesh* callers) {
+  const dermis_posed_mesh posed = in(callers, "posed");
+  const View view(posed.mesh);
+  return must(reference::skin(view.mesh, jointsOf(posed.joints, posed.joint_count, "joints"),
+                              methodOf(posed.method), morphsOf(posed.morphs, posed.morph_count)));
+}
+
+template <typename Vector>
+void copyTo(double* to, std::size_t count, const std::vector<Vector>& from, const char* name) {
+  if (to == nullptr) return;
+  const std::size_t size = from.size() * std::tuple_size_v<Vector>;
+  if (from.empty()) fail(std::string("the mesh has no ") + name);
+  if (count != size) {
+    fail(std::string(name) + " have " + std::to_string(size) + " numbers, not " +
+         std::to_string(count));
+  }
+  for (const Vector& vector : from) to = std::copy(vector.begin(), vector.end(), to);
+}
+
+SkinnedAttribute attributeOf(const dermis_skinned_attribute& attribute, std::uint32_t count) {
+  return {attribute.data, attribute.data == nullptr ? 0 : count, attribute.stride,
+          static_cast<VertexFormat>(enumerator(attribute.format, DERMIS_FORMAT_OCTAHEDRAL8X2,
+                                               "the format of an attribute"))};
+}
+
+}  // namespace
+
+extern "C" {
+
+dermis_code dermis_reference_skin(const dermis_posed_mesh* posed, double* positions,
+                                  size_t position_count, double* normals, size_t normal_count,
+                                  double* tangents, size_t tangent_count, dermis_error* error) {
+  return guarded(error, [&] {
+    const reference::SkinnedMesh skinned = skin(posed);
+    copyTo(positions, position_count, skinned.positions, "positions");
+    copyTo(normals, normal_count, skinned.normals, "normals");
+    copyTo(tangents, tangent_count, skinned.tangents, "tangents");
+  });
+}
+
+dermis_code dermis_compare(const dermis_posed_mesh* posed, const dermis_skinned_view* callers,
+                           dermis_comparison* comparison, dermis_error* error) {
+  return guarded(error, [&] {
+    const reference::SkinnedMesh expected = skin(posed);
+    const dermis_skinned_view actual = in(callers, "skinned");
+    checkOut(comparison, "comparison");
+    SkinnedView view;
+    view.positions = attributeOf(actual.positions, actual.vertex_count);
+    view.normals = attributeOf(actual.normals, actual.vertex_count);
+    view.tangents = attributeOf(actual.tangents, actual.vertex_count);
+    view.box = boxOf(actual.box);
+    if (actual.positions.data == nullptr) fail("the skinned vertices have no positions");
+    const Comparison found = must(compareWithReference(expected, view, exemptionsOf(expected)));
+    dermis_comparison result{};
+    result.passed = found.passed() ? 1 : 0;
+    result.worst_position = found.worstPosition;
+    result.worst_normal = found.worstNormal;
+    result.worst_tangent = found.worstTangent;
+    result.largest_position_error = found.largestPositionError;
+    result.compared = found.compared;
+    result.failures = found.failures;
+    result.only_finite = found.exempt.onlyFinite;
+    result.skipped = found.exempt.skipped;
+    result.out_of_range = found.exempt.outOfRange;
+    result.worst_position_vertex = found.worstPositionVertex;
+    result.first_failure = found.firstFailure;
+    give(comparison, result);
+  });
+}
+
+}  // extern "C"

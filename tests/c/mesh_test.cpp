@@ -1,0 +1,308 @@
+// The C interface against that of C++: meshes, errors, and the numbers of enums.
+
+#include "c_helpers.h"
+#include "dermis/cpu.h"
+#include "dermis/dermis_compare.h"
+#include "dermis/verify.h"
+
+namespace dermis::test {
+namespace {
+
+// The numbers of C are those of C++, but for methods, where 0 is the default.
+static_assert(DERMIS_HEADER_VERSION ==
+              DERMIS_VERSION_MAJOR * 10000 + DERMIS_VERSION_MINOR * 100 + DERMIS_VERSION_PATCH);
+static_assert(DERMIS_INVALID_ARGUMENT == static_cast<int>(ErrorCode::invalidArgument) + 1);
+static_assert(DERMIS_IO_ERROR == static_cast<int>(ErrorCode::ioError) + 1);
+static_assert(DERMIS_METHOD_LINEAR == static_cast<int>(Method::linear) + 1);
+static_assert(DERMIS_METHOD_BULGE_CONTROLLED == static_cast<int>(Method::bulgeControlled) + 1);
+static_assert(DERMIS_UINT32 == static_cast<int>(ComponentType::uint32));
+static_assert(DERMIS_UNORM8 == static_cast<int>(ComponentType::unorm8));
+static_assert(DERMIS_FORMAT_OCTAHEDRAL8X2 == static_cast<int>(VertexFormat::octahedral8x2));
+static_assert(DERMIS_FORMAT_SNORM16X4 == static_cast<int>(VertexFormat::snorm16x4));
+static_assert(DERMIS_PROMISE_RIGID == static_cast<int>(JointPromise::rigid));
+static_assert(DERMIS_PROBLEM_TANGENT_SIGN == static_cast<int>(MeshProblem::tangentSign));
+static_assert(DERMIS_PROBLEM_JOINT_OUT_OF_RANGE == static_cast<int>(MeshProblem::jointOutOfRange));
+static_assert(DERMIS_PREVIOUS_POSITIONS == static_cast<int>(Stream::previousPositions));
+static_assert(DERMIS_BUFFER_ROLE_COUNT == bufferRoleCount);
+static_assert(DERMIS_BUFFER_GPU_POSES == static_cast<int>(BufferRole::gpuPoses));
+static_assert(DERMIS_USE_INDIRECT_READ == static_cast<int>(Use::indirectRead));
+static_assert(DERMIS_USE_COPY_READ == static_cast<int>(Use::copyRead));
+static_assert(DERMIS_VISIBILITY_BUFFER == visibilityBuffer);
+
+TEST(CMeshTest, AViewOfCIsTheSameMesh) {
+  CMesh source(1);
+  Owned<dermis_packed> packed;
+  expectOk(dermis_pack(&source.view, source.jointCount, &packed, &error));
+  const PackedMesh expected = must(pack(source.mesh.view(), source.jointCount));
+  dermis_packed_info info = sized<dermis_packed_info>();
+  expectOk(dermis_packed_contents(packed, &info, &error));
+  ASSERT_EQ(info.byte_count, expected.bytes().size());
+  EXPECT_TRUE(isSame(info.bytes, expected.bytes().data(), info.byte_count));
+  const MeshInfo known = expected.info();
+  EXPECT_EQ(info.vertex_count, known.vertexCount);
+  EXPECT_EQ(info.required_joints, known.requiredJoints);
+  EXPECT_EQ(info.max_influences, known.maxInfluences);
+  EXPECT_EQ(info.min_influences, known.minInfluences);
+  EXPECT_EQ(info.morph_target_count, known.morphTargetCount);
+  EXPECT_EQ(info.has_normals, 1u);
+  EXPECT_EQ(info.has_tangents, 1u);
+  EXPECT_EQ(info.has_centers_of_rotation, 1u);
+
+  Owned<dermis_packed> loaded;
+  expectOk(dermis_packed_load(info.bytes, info.byte_count, &loaded, &error));
+  expectError(dermis_packed_load(info.bytes, info.byte_count - 16, &loaded, &error), "",
+              DERMIS_INVALID_DATA);
+}
+
+TEST(CMeshTest, ScalesOfZeroAreOne) {
+  CMesh source(2);
+  const auto bytes = [&] {
+    Owned<dermis_packed> packed;
+    dermis_packed_info info = sized<dermis_packed_info>();
+    expectOk(dermis_pack(&source.view, source.jointCount, &packed, &error));
+    expectOk(dermis_packed_contents(packed, &info, &error));
+    const auto* first = static_cast<const std::byte*>(info.bytes);
+    return std::vector<std::byte>(first, first + info.byte_count);
+  };
+  const auto zeros = bytes();
+  for (float& scale : source.view.position_scale) scale = 1;
+  for (dermis_morph_target& target : source.targets) {
+    for (float& scale : target.position_scale) scale = 1;
+  }
+  EXPECT_EQ(bytes(), zeros);
+  source.view.position_scale[1] = 0;  // a flat mesh
+  EXPECT_NE(bytes(), zeros);
+}
+
+TEST(CMeshTest, ATargetWithoutVerticesDisplacesNothing) {
+  CMesh source(3);
+  source.targets[1].vertex_count = 0;
+  Owned<dermis_packed> packed;
+  expectOk(dermis_pack(&source.view, source.jointCount, &packed, &error));
+  source.targets[1].vertices = nullptr;  // now all vertices, for which there are not enough
+  source.targets[1].positions = {};
+  source.targets[1].normals = {};
+  source.targets[1].tangents = {};
+  Owned<dermis_packed> absent;
+  expectOk(dermis_pack(&source.view, source.jointCount, &absent, &error));
+  dermis_packed_info a = sized<dermis_packed_info>(), b = a;
+  expectOk(dermis_packed_contents(packed, &a, &error));
+  expectOk(dermis_packed_contents(absent, &b, &error));
+  ASSERT_EQ(a.byte_count, b.byte_count);
+  EXPECT_TRUE(isSame(a.bytes, b.bytes, a.byte_count));
+}
+
+TEST(CMeshTest, FindingsAndRepair) {
+  CMesh source(4);
+  source.mesh.weights[2] = -1;
+  source.mesh.positions[7] = std::numeric_limits<float>::quiet_NaN();
+  const MeshReport expected = validate(source.mesh.view(), source.jointCount);
+  std::vector<std::string> messages;
+  const dermis_finding_callback collect = [](void* user, const dermis_finding* finding) {
+    static_cast<std::vector<std::string>*>(user)->push_back(
+        std::string(finding->message) + std::to_string(finding->problem) +
+        std::to_string(finding->count) + std::to_string(finding->first_vertex) +
+        std::to_string(finding->is_refused));
+    return DERMIS_OK;
+  };
+  expectError(dermis_validate(&source.view, source.jointCount, collect, &messages, &error),
+              "a mesh of C", DERMIS_INVALID_MESH);
+  ASSERT_EQ(messages.size(), expected.findings.size());
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    const MeshFinding& finding = expected.findings[i];
+    std::string message = finding.message;
+    message.replace(message.find("random"), 6, "a mesh of C");
+    EXPECT_EQ(messages[i], message + std::to_string(static_cast<int>(finding.problem)) +
+                               std::to_string(finding.count) + std::to_string(finding.firstVertex) +
+                               std::to_string(refusedByPack(finding.problem) ? 1 : 0));
+  }
+  const dermis_finding_callback stop = [](void*, const dermis_finding*) {
+    return DERMIS_LIMIT_EXCEEDED;
+  };
+  expectError(dermis_validate(&source.view, source.jointCount, stop, nullptr, &error), "callback",
+              DERMIS_LIMIT_EXCEEDED);
+
+  Owned<dermis_packed> packed;
+  expectError(dermis_pack(&source.view, source.jointCount, &packed, &error), "a mesh of C",
+              DERMIS_INVALID_MESH);
+  EXPECT_EQ(packed.object, nullptr);
+  Owned<dermis_repaired> repaired;
+  dermis_mesh_view view = sized<dermis_mesh_view>();
+  expectOk(dermis_repair(&source.view, source.jointCount, &view, &repaired, &error));
+  expectOk(dermis_pack(&view, source.jointCount, &packed, &error));
+  const RepairedMesh right = must(repair(source.mesh.view(), source.jointCount));
+  const PackedMesh expectedMesh = must(pack(right.view(), source.jointCount));
+  dermis_packed_info info = sized<dermis_packed_info>();
+  expectOk(dermis_packed_contents(packed, &info, &error));
+  ASSERT_EQ(info.byte_count, expectedMesh.bytes().size());
+  EXPECT_TRUE(isSame(info.bytes, expectedMesh.bytes().data(), info.byte_count));
+}
+
+TEST(CMeshTest, CentersOfRotation) {
+  CMesh source(5, 200);
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t i = 0; i + 2 < 200; ++i) triangles.insert(triangles.end(), {i, i + 1, i + 2});
+  const auto solver =
+      must(CenterOfRotationSolver::make(source.mesh.view(), source.jointCount, triangles));
+  std::vector<float> expected(600), alone(600), shared(600, 7);
+  must(solver.solve(0, expected));
+  expectOk(dermis_centers_of_rotation(&source.view, source.jointCount, triangles.data(),
+                                      triangles.size(), solver.termCount(), nullptr, nullptr,
+                                      alone.data(), alone.size(), &error));
+  EXPECT_EQ(alone, expected);
+  const dermis_parallel_callback backwards = [](void*, uint32_t count, void (*job)(void*, uint32_t),
+                                                void* context) {
+    for (uint32_t i = count + 3; i-- > 0;) job(context, i);  // more than there are: ignored
+    return DERMIS_OK;
+  };
+  expectOk(dermis_centers_of_rotation(&source.view, source.jointCount, triangles.data(),
+                                      triangles.size(), 0, backwards, nullptr, shared.data(),
+                                      shared.size(), &error));
+  EXPECT_EQ(shared, expected);
+  expectError(dermis_centers_of_rotation(&source.view, source.jointCount, triangles.data(),
+                                         triangles.size(), solver.termCount() - 1, nullptr, nullptr,
+                                         alone.data(), alone.size(), &error),
+              "terms", DERMIS_LIMIT_EXCEEDED);
+  expectError(
+      dermis_centers_of_rotation(&source.view, source.jointCount, triangles.data(),
+                                 triangles.size(), 0, nullptr, nullptr, alone.data(), 599, &error),
+      "float_count is 599");
+}
+
+TEST(CMeshTest, PlacesAreThoseOfCpp) {
+  for (const bool planar : {false, true}) {
+    const dermis_layout layout = {DERMIS_FORMAT_SNORM16X4,
+                                  DERMIS_FORMAT_OCTAHEDRAL16X2,
+                                  DERMIS_FORMAT_OCTAHEDRAL8X2,
+                                  1,
+                                  planar ? 1u : 0u,
+                                  0};
+    const VertexLayout same{VertexFormat::snorm16x4, VertexFormat::octahedral16x2,
+                            VertexFormat::octahedral8x2, true, planar};
+    const std::uint64_t alignment = must(placeVertices(same, 10)).alignment;
+    const VertexPlaces expected = must(placeVertices(same, 10, 2 * alignment));
+    dermis_places places{};
+    expectOk(dermis_place_vertices(&layout, 10, 2 * alignment, &places, &error));
+    EXPECT_EQ(places.byte_count, expected.size);
+    EXPECT_EQ(places.alignment, expected.alignment);
+    for (std::size_t i = 0; i < streamCount; ++i) {
+      EXPECT_EQ(places.streams[i].offset, expected.attributes[i].offset);
+      EXPECT_EQ(places.streams[i].stride, expected.attributes[i].stride);
+      EXPECT_EQ(static_cast<int>(places.streams[i].format),
+                static_cast<int>(expected.attributes[i].format));
+    }
+    expectError(dermis_place_vertices(&layout, 10, 2 * alignment + 1, &places, &error),
+                "multiple of");
+  }
+}
+
+// What is wrong is named, and nothing is read or written beside it.
+TEST(CMeshTest, PointersSizesAndEnumsAreChecked) {
+  CMesh source(6);
+  Owned<dermis_packed> packed;
+  expectError(dermis_pack(nullptr, 8, &packed, &error), "mesh is null");
+  expectError(dermis_pack(&source.view, 8, nullptr, &error), "packed is null");
+  EXPECT_EQ(dermis_pack(nullptr, 8, &packed, nullptr), DERMIS_INVALID_ARGUMENT);
+  dermis_mesh_view view = source.view;
+  view.size = 12;
+  expectError(dermis_pack(&view, 8, &packed, &error), "mesh: its size is 12, not ");
+  view = source.view;
+  view.influence_sets = nullptr;
+  expectError(dermis_pack(&view, 8, &packed, &error), "influence_sets is null");
+  view = source.view;
+  view.normals.type = static_cast<dermis_component>(9);
+  expectError(dermis_pack(&view, 8, &packed, &error), "component type of an attribute is 9");
+  view.normals.type = static_cast<dermis_component>(256);  // 0 as a byte
+  expectError(dermis_pack(&view, 8, &packed, &error), "component type of an attribute is 256");
+  dermis_layout layout{};
+  layout.normals = static_cast<dermis_format>(257);
+  dermis_places places{};
+  expectError(dermis_place_vertices(&layout, 1, 0, &places, &error),
+              "format of the normals is 257");
+  EXPECT_EQ(packed.object, nullptr);
+  dermis_destroy(nullptr);
+
+  // A caller with a newer header.
+  struct Newer {
+    dermis_mesh_view view;
+    std::uint64_t added;
+  } newer{source.view, 0};
+  newer.view.size = sizeof(newer);
+  expectOk(dermis_pack(&newer.view, 8, &packed, &error));
+  newer.added = 1;
+  Owned<dermis_packed> other;
+  expectError(dermis_pack(&newer.view, 8, &other, &error), "does not know");
+  struct NewerInfo {
+    dermis_packed_info info = sized<dermis_packed_info>();
+    std::uint64_t added = 5;
+  } info;
+  info.info.size = sizeof(info);
+  expectOk(dermis_packed_contents(packed, &info.info, &error));
+  EXPECT_EQ(info.info.vertex_count, 50u);
+  EXPECT_EQ(info.info.size, sizeof(info));
+  EXPECT_EQ(info.added, 5u);
+}
+
+TEST(CMeshTest, ALongMessageIsCutBetweenCharacters) {
+  CMesh source(7);
+  std::string name;
+  for (int i = 0; i < 300; ++i) name += "\u20ac";  // three bytes each
+  source.view.name = name.c_str();
+  source.mesh.weights[0] = -1;
+  Owned<dermis_packed> packed;
+  std::memset(&error, 'x', sizeof(error));
+  EXPECT_EQ(dermis_pack(&source.view, 8, &packed, &error), DERMIS_INVALID_MESH);
+  const std::string message = error.message;
+  EXPECT_LT(message.size(), sizeof(error.message));
+  std::size_t characters = 0;
+  for (std::size_t i = 0; i < message.size(); ++characters) {
+    const auto first = static_cast<unsigned char>(message[i]);
+    i += first < 0x80 ? 1 : 3;
+    EXPECT_LE(i, message.size()) << "the last character is cut";
+  }
+}
+
+TEST(CMeshTest, TheReferenceIsThatOfCpp) {
+  CMesh source(8);
+  const std::vector<JointMatrix> pose = samples::randomPose(3, 8, samples::Rigidity::shear);
+  const dermis_morph_weight morphs[] = {{0, 0.5f}, {2, -1}};
+  dermis_posed_mesh posed = sized<dermis_posed_mesh>();
+  posed.mesh = &source.view;
+  posed.joints = reinterpret_cast<const dermis_joint*>(pose.data());
+  posed.joint_count = 8;
+  posed.morphs = morphs;
+  posed.morph_count = 2;
+  posed.method = DERMIS_METHOD_BLENDED;
+  std::vector<double> positions(150), normals(150), tangents(200);
+  expectOk(dermis_reference_skin(&posed, positions.data(), 150, normals.data(), 150,
+                                 tangents.data(), 200, &error));
+  const MorphWeight same[] = {{0, 0.5f}, {2, -1}};
+  const auto expected = must(reference::skin(source.mesh.view(), pose, Method::blended, same));
+  EXPECT_TRUE(isSame(positions.data(), expected.positions.data(), 150 * sizeof(double)));
+  EXPECT_TRUE(isSame(normals.data(), expected.normals.data(), 150 * sizeof(double)));
+  EXPECT_TRUE(isSame(tangents.data(), expected.tangents.data(), 200 * sizeof(double)));
+  expectError(dermis_reference_skin(&posed, positions.data(), 149, nullptr, 0, nullptr, 0, &error),
+              "positions have 150 numbers, not 149");
+
+  std::vector<float> skinned(150);
+  for (std::size_t i = 0; i < 150; ++i) skinned[i] = static_cast<float>(positions[i]);
+  dermis_skinned_view view = sized<dermis_skinned_view>();
+  view.vertex_count = 50;
+  view.positions = {skinned.data(), 12, DERMIS_FORMAT_FLOAT32X3};
+  dermis_comparison comparison = sized<dermis_comparison>();
+  expectOk(dermis_compare(&posed, &view, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 1u);
+  EXPECT_EQ(comparison.compared + comparison.only_finite + comparison.out_of_range, 50u);
+  skinned[30] += 1;
+  expectOk(dermis_compare(&posed, &view, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 0u);
+  EXPECT_EQ(comparison.failures, 1u);
+  EXPECT_EQ(comparison.first_failure, 10u);
+  EXPECT_EQ(comparison.worst_position_vertex, 10u);
+  EXPECT_NEAR(comparison.largest_position_error, 1, 1e-5);
+  view.vertex_count = 49;
+  expectError(dermis_compare(&posed, &view, &comparison, &error), "");
+}
+
+}  // namespace
+}  // namespace dermis::test
