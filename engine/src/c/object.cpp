@@ -1,6 +1,8 @@
 #include "object.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string>
 #include <string_view>
 
 namespace dermis::c {
@@ -21,7 +23,9 @@ dermis_code report(dermis_error* error, dermis_code code, std::string_view messa
 }
 
 Error callbackError(dermis_code code, const dermis_error& error, const char* callback) {
-  Error result{ErrorCode::vulkanError, error.message, error.vulkan_result};
+  // The caller may have filled the message without a zero at the end.
+  const char* end = std::find(error.message, std::end(error.message), '\0');
+  Error result{ErrorCode::vulkanError, std::string(error.message, end), error.vulkan_result};
   if (code >= DERMIS_INVALID_ARGUMENT && code <= DERMIS_IO_ERROR)
     result.code = static_cast<ErrorCode>(static_cast<int>(code) - 1);
   if (result.message.empty())
