@@ -53,8 +53,17 @@ extern "C" {
 dermis_code dermis_make_plan(const dermis_batch* callers, const dermis_limits* limits,
                              const dermis_tuning* tuning, dermis_plan** plan, dermis_error* error) {
   return guarded(error, [&] {
-    const dermis_batch desc = in(callers, "batch");
     dermis_plan*& result = required(plan, "plan");
+    std::unique_ptr<dermis_plan> made;
+    if (result == nullptr) made = std::make_unique<dermis_plan>();
+    dermis_plan& filled = made ? *made : *result;
+    // It is empty if anything below fails.
+    filled.list.fill({});
+    filled.pipelines.clear();
+    filled.firstResult = 0;
+    must(makePlan({}, {}, {}, filled.plan));
+
+    const dermis_batch desc = in(callers, "batch");
     std::vector<PoseDescription> poses;
     for (const dermis_batch_pose& pose : array(desc.poses, desc.pose_count, "poses"))
       poses.push_back({pose.joint_count, pose.matrix_offset, promiseOf(pose.promise)});
@@ -81,12 +90,6 @@ dermis_code dermis_make_plan(const dermis_batch* callers, const dermis_limits* l
     std::copy_n(desc.output_bytes, streamCount, batch.outputSizes.begin());
     batch.isOneOutput = desc.has_separate_outputs == 0;
 
-    std::unique_ptr<dermis_plan> made;
-    if (result == nullptr) made = std::make_unique<dermis_plan>();
-    dermis_plan& filled = made ? *made : *result;
-    filled.list.fill({});
-    filled.pipelines.clear();
-    filled.firstResult = 0;
     must(makePlan(batch, limitsOf(limits), tuningOf(tuning), filled.plan));
     filled.list.fill(filled.plan.commands());
     for (const PipelineId id : filled.plan.pipelines())
