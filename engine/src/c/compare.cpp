@@ -20,7 +20,8 @@ reference::SkinnedMesh skin(const dermis_posed_mesh* callers) {
 }
 
 template <typename Vector>
-void copyTo(double* to, std::size_t count, const std::vector<Vector>& from, const char* name) {
+void checkCount(const double* to, std::size_t count, const std::vector<Vector>& from,
+                const char* name) {
   if (to == nullptr) return;
   const std::size_t size = from.size() * std::tuple_size_v<Vector>;
   if (from.empty()) fail(std::string("the mesh has no ") + name);
@@ -28,6 +29,10 @@ void copyTo(double* to, std::size_t count, const std::vector<Vector>& from, cons
     fail(std::string(name) + " have " + std::to_string(size) + " numbers, not " +
          std::to_string(count));
   }
+}
+template <typename Vector>
+void copyTo(double* to, const std::vector<Vector>& from) {
+  if (to == nullptr) return;
   for (const Vector& vector : from) to = std::copy(vector.begin(), vector.end(), to);
 }
 
@@ -46,9 +51,12 @@ dermis_code dermis_reference_skin(const dermis_posed_mesh* posed, double* positi
                                   double* tangents, size_t tangent_count, dermis_error* error) {
   return guarded(error, [&] {
     const reference::SkinnedMesh skinned = skin(posed);
-    copyTo(positions, position_count, skinned.positions, "positions");
-    copyTo(normals, normal_count, skinned.normals, "normals");
-    copyTo(tangents, tangent_count, skinned.tangents, "tangents");
+    checkCount(positions, position_count, skinned.positions, "positions");
+    checkCount(normals, normal_count, skinned.normals, "normals");
+    checkCount(tangents, tangent_count, skinned.tangents, "tangents");
+    copyTo(positions, skinned.positions);
+    copyTo(normals, skinned.normals);
+    copyTo(tangents, skinned.tangents);
   });
 }
 
