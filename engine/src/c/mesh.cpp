@@ -1,6 +1,7 @@
 // Checking, repairing and packing meshes; centers of rotation; places of vertices.
 #include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "convert.h"
 
@@ -110,7 +111,10 @@ dermis_code dermis_centers_of_rotation(const dermis_mesh_view* mesh, uint32_t jo
     struct Work {
       const CenterOfRotationSolver& solver;
       std::span<float> centers;
-    } work{solver, all};
+    };
+    // The outputs stay as they are if the callback fails half way.
+    std::vector<float> found(all.size());
+    Work work{solver, found};
     constexpr std::size_t vertices = 64;  // of a job
     const auto job = [](void* context, uint32_t index) {
       const Work& mine = *static_cast<const Work*>(context);
@@ -128,6 +132,7 @@ dermis_code dermis_centers_of_rotation(const dermis_mesh_view* mesh, uint32_t jo
       const dermis_code code = parallel(user, count, job, &work);
       if (code != DERMIS_OK) fail("the callback stopped the function", code);
     }
+    std::copy(found.begin(), found.end(), all.begin());
   });
 }
 
