@@ -174,8 +174,11 @@ dermis_code dermis_indexed_draws(const dermis_scene* scene, const dermis_instanc
       handles.push_back(handleOf(instance));
     array(ranges, range_count, "ranges");
     array(draws, count, "draws");
+    // The outputs stay as they are if one of the instances is refused.
+    std::vector<IndexedDraw> filled(count);
     must(source.indexedDraws(handles, {reinterpret_cast<const IndexRange*>(ranges), range_count},
-                             {reinterpret_cast<IndexedDraw*>(draws), count}));
+                             filled));
+    if (count != 0) std::memcpy(draws, filled.data(), count * sizeof(IndexedDraw));
   });
 }
 
