@@ -1,5 +1,12 @@
 // The C interface against that of C++: meshes, errors, and the numbers of enums.
 
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
 #include "c_helpers.h"
 #include "dermis/cpu.h"
 #include "dermis/dermis_compare.h"
@@ -244,21 +251,21 @@ TEST(CMeshTest, PointersSizesAndEnumsAreChecked) {
 }
 
 TEST(CMeshTest, ALongMessageIsCutBetweenCharacters) {
-  CMesh source(7);
-  std::string name;
-  for (int i = 0; i < 300; ++i) name += "\u20ac";  // three bytes each
-  source.view.name = name.c_str();
-  source.mesh.weights[0] = -1;
-  Owned<dermis_packed> packed;
-  std::memset(&error, 'x', sizeof(error));
-  EXPECT_EQ(dermis_pack(&source.view, 8, &packed, &error), DERMIS_INVALID_MESH);
-  const std::string message = error.message;
-  EXPECT_LT(message.size(), sizeof(error.message));
-  std::size_t characters = 0;
-  for (std::size_t i = 0; i < message.size(); ++characters) {
-    const auto first = static_cast<unsigned char>(message[i]);
-    i += first < 0x80 ? 1 : 3;
-    EXPECT_LE(i, message.size()) << "the last character is cut";
+  for (std::size_t shift = 0; shift < 3; ++shift) {
+    std::string path(shift, 'x');
+    for (int euro = 0; euro < 300; ++euro) path += "\u20ac";  // three bytes each
+    dermis_model_source source = sized<dermis_model_source>();
+    source.path = path.c_str();
+    Owned<dermis_model> model;
+    std::memset(&error, 'x', sizeof(error));
+    EXPECT_EQ(dermis_model_load(&source, &model, &error), DERMIS_IO_ERROR);
+    const std::string message = error.message;
+    EXPECT_LT(message.size(), sizeof(error.message));
+    EXPECT_GT(message.size(), sizeof(error.message) - 4);
+    for (std::size_t i = 0; i < message.size();) {
+      i += static_cast<unsigned char>(message[i]) < 0x80 ? 1u : 3u;
+      EXPECT_LE(i, message.size()) << "the last character is cut";
+    }
   }
 }
 
@@ -300,6 +307,15 @@ TEST(CMeshTest, TheReferenceIsThatOfCpp) {
   EXPECT_EQ(comparison.first_failure, 10u);
   EXPECT_EQ(comparison.worst_position_vertex, 10u);
   EXPECT_NEAR(comparison.largest_position_error, 1, 1e-5);
+  // Relative to a box: 4 components of 16 bits.
+  std::vector<std::int16_t> stored(200, 32767);
+  view.box = {{-32, -32, -32}, {32, 32, 32}};
+  for (std::size_t i = 0; i < 150; ++i) {
+    stored[i / 3 * 4 + i % 3] = static_cast<std::int16_t>(std::lround(positions[i] / 32 * 32767));
+  }
+  view.positions = {stored.data(), 8, DERMIS_FORMAT_SNORM16X4};
+  expectOk(dermis_compare(&posed, &view, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 1u);
   view.vertex_count = 49;
   expectError(dermis_compare(&posed, &view, &comparison, &error), "");
 }

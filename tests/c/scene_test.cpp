@@ -1,9 +1,14 @@
 // The C interface against that of C++: scenes, on the CPU and as commands, batches and glTF. What
 // both do must be the same to the bit.
 
+#include <algorithm>
 #include <array>
-#include <cstdlib>
+#include <cstring>
 #include <map>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include "c_helpers.h"
 #include "dermis/cpu.h"
@@ -355,6 +360,9 @@ TEST(CSceneTest, CapacitiesAndLentMemory) {
   dermis_runner_frame jobs = sized<dermis_runner_frame>();
   expectOk(dermis_runner_jobs(runner, 0, &jobs, &error));
   EXPECT_EQ(jobs.output, memory.data());
+  dermis_scene_info info = sized<dermis_scene_info>();
+  expectOk(dermis_scene_contents(lent, &info, &error));
+  EXPECT_EQ(info.outputs.capacity, memory.size());
   desc.output_byte_count = 2;
   Owned<dermis_runner> small;
   expectError(dermis_runner_create(&desc, &small, &error), "");
@@ -489,6 +497,12 @@ TEST(CCommandsTest, AreThoseOfCpp) {
   desc.limits = &limits;
   desc.tuning = &tuning;
   desc.output_offset = 192;
+  dermis_scene_desc sceneDesc = sized<dermis_scene_desc>();
+  sceneDesc.frames_in_flight = 3;
+  sceneDesc.mesh_bytes.initial = 1 << 20;
+  sceneDesc.output_bytes = {1 << 18, 1 << 20};
+  sceneDesc.bounds.initial = 128;
+  desc.scene = &sceneDesc;
   desc.user = &buffers;
   desc.create_buffer = Buffers::create;
   desc.release_buffer = Buffers::release;
@@ -501,6 +515,10 @@ TEST(CCommandsTest, AreThoseOfCpp) {
   description.limits = smallLimitsOfCpp();
   description.tuning.instancesPerInvocation = 2;
   description.outputOffset = 192;
+  description.scene.framesInFlight = 3;
+  description.scene.meshCapacity.initial = 1 << 20;
+  description.scene.outputCapacity = {1 << 18, 1 << 20};
+  description.scene.boundsCapacity.initial = 128;
   description.memory = {&memory,
                         [](void* user, const SceneBuffer& buffer) -> Result<void*> {
                           auto& all = *static_cast<decltype(memory)*>(user);
@@ -509,6 +527,8 @@ TEST(CCommandsTest, AreThoseOfCpp) {
                         },
                         [](void*, std::uint32_t) {}};
   SceneCommands same = must(SceneCommands::create(description));
+  for (const auto& [number, bytes] : memory)
+    EXPECT_EQ(buffers.buffers[number].size(), bytes.size()) << "buffer " << number;
 
   CMesh source(1);
   Owned<dermis_packed> packed;
@@ -533,10 +553,14 @@ TEST(CCommandsTest, AreThoseOfCpp) {
     instance.pose = samePoses[i];
     dermis_instance added{};
     expectOk(dermis_add_instance(scene, &figure, &added, &error));
-    static_cast<void>(must(same.scene().addInstance(instance)));
+    const InstanceHandle sameInstance = must(same.scene().addInstance(instance));
     dermis_part part{};
     expectOk(dermis_commands_pose_part(commands, poses[i], &part, &error));
     expectPart(part, must(same.posePart(samePoses[i])));
+    dermis_instance_info info = sized<dermis_instance_info>();
+    expectOk(dermis_instance_contents(scene, added, &info, &error));
+    EXPECT_GE(info.offset, 192u);
+    EXPECT_EQ(info.offset, must(same.scene().output(sameInstance)).offset);
   }
   for (std::uint64_t frame = 1; frame <= 3; ++frame) {
     expectOk(dermis_begin_frame(scene, frame, frame - 1, &error));
@@ -694,6 +718,13 @@ TEST(CBatchTest, IsThatOfCpp) {
     EXPECT_EQ(tables, sameTables);
     expectError(dermis_write_tables(plan, tables.data(), tables.size() - 1, &error), "");
   }
+  // Positions and normals in buffers of their own.
+  batch.has_separate_outputs = 1;
+  same.isOneOutput = false;
+  const Result<void> apart = makePlan(same, smallLimitsOfCpp(), {}, expected);
+  EXPECT_EQ(dermis_make_plan(&batch, &limits, nullptr, &plan, &error) == DERMIS_OK, apart.ok());
+  EXPECT_FALSE(apart.ok()) << "formats of 2 bytes must be in one buffer";
+  batch.has_separate_outputs = 0;
   // An error leaves an empty plan.
   poses[0].joint_count = 1;
   expectError(dermis_make_plan(&batch, &limits, nullptr, &plan, &error), "joints");

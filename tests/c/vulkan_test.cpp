@@ -1,6 +1,12 @@
 // The C interface on the pretended driver, against that of C++: what the engine passes reaches
 // Dermis.
 
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
 #include "c_helpers.h"
 #include "mock_batch.h"
 
@@ -66,10 +72,37 @@ TEST_F(CVulkanTest, LimitsAndTuningAreThoseOfCpp) {
     EXPECT_EQ(tuning.min_workgroups, sameTuning.minWorkgroups);
     EXPECT_EQ(tuning.vertices_per_invocation, sameTuning.verticesPerInvocation);
   }
+  for (const std::string missing : {"instance", "physical", "device", "proc"}) {
+    dermis_device_desc desc = describe();
+    if (missing == "instance") desc.instance = nullptr;
+    if (missing == "physical") desc.physical_device = nullptr;
+    if (missing == "device") desc.device = nullptr;
+    if (missing == "proc") desc.get_instance_proc_addr = nullptr;
+    Owned<dermis_context> refused;
+    EXPECT_EQ(dermis_context_create(&desc, nullptr, nullptr, &refused, &error),
+              DERMIS_INVALID_ARGUMENT)
+        << missing;
+  }
   dermis_device_desc desc = describe();
   desc.api_version = 0;
   Owned<dermis_context> refused;
   expectError(dermis_context_create(&desc, nullptr, nullptr, &refused, &error), "apiVersion");
+}
+
+TEST_F(CVulkanTest, TheEnginesPipelineCacheAndAllocator) {
+  const VkAllocationCallbacks callbacks{};
+  mock.allocator = &callbacks;
+  dermis_device_desc desc = describe();
+  desc.pipeline_cache = reinterpret_cast<VkPipelineCache>(std::uintptr_t{77});
+  Owned<dermis_context> made;
+  expectOk(dermis_context_create(&desc, nullptr, nullptr, &made, &error));
+  const dermis_instance_desc like = sized<dermis_instance_desc>();
+  expectOk(dermis_prepare(made, nullptr, &like, &error));
+  ASSERT_FALSE(mock.cachesOfPipelines.empty());
+  for (const VkPipelineCache cache : mock.cachesOfPipelines) EXPECT_EQ(cache, desc.pipeline_cache);
+  dermis_destroy(made.object);
+  made.object = nullptr;
+  EXPECT_FALSE(mock.wrongAllocator);
 }
 
 TEST_F(CVulkanTest, Barriers) {
@@ -198,6 +231,11 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
                 DERMIS_VULKAN_ERROR);
     EXPECT_EQ(error.vulkan_result, 0);
     allocator.isEmpty = false;
+    dermis_tuning tuning = sized<dermis_tuning>();
+    tuning.workgroup_size = 3;
+    desc.tuning = &tuning;
+    expectError(dermis_recorder_create(cContext, &desc, &recorder, &error), "workgroup");
+    desc.tuning = nullptr;
     expectOk(dermis_recorder_create(cContext, &desc, &recorder, &error));
     EXPECT_TRUE(std::ranges::any_of(allocator.usages, [](VkBufferUsageFlags usage) {
       return (usage & VK_BUFFER_USAGE_INDEX_BUFFER_BIT) != 0;

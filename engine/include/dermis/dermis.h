@@ -97,9 +97,11 @@ DERMIS_C_API void dermis_destroy(void* object);
 typedef struct dermis_mesh {
   uint32_t kind, index, generation;
 } dermis_mesh;
+// A pose.
 typedef struct dermis_pose {
   uint32_t kind, index, generation;
 } dermis_pose;
+// An instance.
 typedef struct dermis_instance {
   uint32_t kind, index, generation;
 } dermis_instance;
@@ -286,6 +288,7 @@ typedef struct dermis_packed_info {
   uint32_t morph_target_count;
   uint32_t has_normals, has_tangents, has_centers_of_rotation;
 } dermis_packed_info;
+// Says what is known about a packed mesh.
 DERMIS_C_API dermis_code dermis_packed_contents(const dermis_packed* packed,
                                                 dermis_packed_info* info, dermis_error* error);
 
@@ -428,6 +431,7 @@ typedef struct dermis_instance_desc {
 // Adds an instance, which the next frame skins.
 DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
                                              dermis_instance* instance, dermis_error* error);
+// Removes an instance and its output.
 DERMIS_C_API dermis_code dermis_remove_instance(dermis_scene* scene, dermis_instance instance,
                                                 dermis_error* error);
 
@@ -496,6 +500,7 @@ typedef struct dermis_instance_info {
   uint64_t offset;            // bytes from the beginning of the output buffer
   dermis_places places;       // offsets count from the beginning of the output buffer
 } dermis_instance_info;
+// Says where an instance is.
 DERMIS_C_API dermis_code dermis_instance_contents(const dermis_scene* scene,
                                                   dermis_instance instance,
                                                   dermis_instance_info* info, dermis_error* error);
@@ -541,11 +546,13 @@ typedef struct dermis_scene_info {
   uint32_t culled_candidates, gpu_visible, gpu_skinned, gpu_settled;
   dermis_store meshes, palettes, outputs;
 } dermis_scene_info;
+// Says what the last frame did, and how much memory the scene has.
 DERMIS_C_API dermis_code dermis_scene_contents(dermis_scene* scene, dermis_scene_info* info,
                                                dermis_error* error);
 
 // ---- The CPU: runs the frames of a scene by SIMD instructions, without Vulkan.
 
+// Owns a scene, and divides its frames into jobs.
 typedef struct dermis_runner dermis_runner;
 // What a runner needs to know.
 typedef struct dermis_runner_desc {
@@ -675,6 +682,7 @@ typedef struct dermis_binding {
   uint32_t is_texel_buffer;  // uniform, VK_FORMAT_R32G32B32A32_UINT; otherwise a storage buffer
 } dermis_binding;
 
+// What a command does.
 typedef enum dermis_command_kind {
   DERMIS_DISPATCH = 0,               // bind the pipeline, push the constants, dispatch
   DERMIS_UPLOAD = 1,                 // copy `bytes` to a part, for example by a staging buffer
@@ -683,6 +691,7 @@ typedef enum dermis_command_kind {
   DERMIS_BARRIER = 4,                // a memory barrier between two uses
   DERMIS_COMMAND_INT32 = 0x7fffffff  // not a value
 } dermis_command_kind;
+// A dispatch.
 typedef struct dermis_dispatch {
   uint64_t pipeline;                      // `dermis_describe_pipeline`
   uint32_t group_count_x, group_count_y;  // 0 if indirect
@@ -694,14 +703,17 @@ typedef struct dermis_dispatch {
   uint32_t binding_count;
   uint32_t constants[9];  // push constants from offset 0
 } dermis_dispatch;
+// Bytes of the CPU that are copied to a buffer; valid as long as the command.
 typedef struct dermis_upload {
   dermis_part to;
   const void* bytes;
 } dermis_upload;
+// A copy from buffer to buffer.
 typedef struct dermis_copy {
   uint32_t from, to;  // numbers of buffers
   uint64_t from_offset, to_offset, byte_count;
 } dermis_copy;
+// What comes before and after a barrier.
 typedef struct dermis_barrier_uses {
   uint32_t before, after;  // of `dermis_use`
 } dermis_barrier_uses;
@@ -717,6 +729,7 @@ typedef struct dermis_command {
   } as;
 } dermis_command;
 
+// The commands of a batch.
 typedef struct dermis_plan dermis_plan;
 // Turns a batch into commands. If *plan is null, a plan is created; otherwise it is filled again.
 // If the function fails, an existing plan is empty.
@@ -736,6 +749,7 @@ typedef struct dermis_plan_info {
   uint32_t dispatch_count;
   dermis_requirement buffers[9];  // by `dermis_buffer_role`
 } dermis_plan_info;
+// Lists what a plan has.
 DERMIS_C_API dermis_code dermis_plan_contents(const dermis_plan* plan, dermis_plan_info* info,
                                               dermis_error* error);
 // Writes the tables that the kernels read: as many bytes as the tables buffer needs.
@@ -761,6 +775,7 @@ typedef struct dermis_pipeline_info {
   uint32_t constant_count;
   uint32_t storage_buffers, texel_buffers;  // in slots from 0 on, one kind after the other
 } dermis_pipeline_info;
+// Describes a pipeline that a plan or `dermis_list_pipelines` named. Needs no device.
 DERMIS_C_API dermis_code dermis_describe_pipeline(uint64_t pipeline, dermis_pipeline_info* info,
                                                   dermis_error* error);
 
@@ -789,6 +804,7 @@ typedef struct dermis_commands_desc {
 } dermis_commands_desc;
 // Owns a scene, and lists the commands of its frames.
 typedef struct dermis_commands dermis_commands;
+// Creates a scene and its first buffers.
 DERMIS_C_API dermis_code dermis_commands_create(const dermis_commands_desc* desc,
                                                 dermis_commands** commands, dermis_error* error);
 // Valid until the commands are destroyed. Null if `commands` is null.
@@ -851,10 +867,13 @@ typedef struct dermis_model_source {
   uint32_t rigid_meshes;   // whether to read rigid meshes that hang on a skeleton
   dermis_missing_normals missing_normals;
 } dermis_model_source;
+// A file that was loaded.
 typedef struct dermis_model dermis_model;
+// Loads a file.
 DERMIS_C_API dermis_code dermis_model_load(const dermis_model_source* source, dermis_model** model,
                                            dermis_error* error);
 
+// An animation.
 typedef struct dermis_clip {
   const char* name;
   double duration;  // seconds
@@ -868,6 +887,7 @@ typedef struct dermis_model_info {
   const dermis_clip* clips;
   const char* const* notes;  // what was fixed or left out, one sentence each
 } dermis_model_info;
+// Lists what a model has.
 DERMIS_C_API dermis_code dermis_model_contents(const dermis_model* model, dermis_model_info* info,
                                                dermis_error* error);
 
@@ -884,6 +904,7 @@ typedef struct dermis_primitive {
   const float* colors;     // COLOR_0, 4 per vertex, or null
   float base_color[4];     // of its material, linear
 } dermis_primitive;
+// Describes skinned primitive number `index`.
 DERMIS_C_API dermis_code dermis_model_primitive(const dermis_model* model, uint32_t index,
                                                 dermis_primitive* primitive, dermis_error* error);
 
@@ -979,6 +1000,7 @@ typedef struct dermis_batch_buffers {
 // Descriptor sets for a set of buffers. Destroy them before the buffers and the context, once the
 // GPU has completed what was recorded with them.
 typedef struct dermis_bindings dermis_bindings;
+// Creates them. Ranges must be aligned as `dermis_plan_contents` says.
 DERMIS_C_API dermis_code dermis_bindings_create(const dermis_context* context,
                                                 const dermis_batch_buffers* buffers,
                                                 dermis_bindings** bindings, dermis_error* error);
@@ -1047,6 +1069,7 @@ typedef struct dermis_recorder_info {
   double plan_seconds, record_seconds;
   double gpu_seconds;  // of the newest complete frame; negative if it was not measured
 } dermis_recorder_info;
+// Says where the output is, and what the last frame cost.
 DERMIS_C_API dermis_code dermis_recorder_contents(const dermis_recorder* recorder,
                                                   dermis_recorder_info* info, dermis_error* error);
 // Where a GPU pass of the engine writes the joint matrices of a pose.

@@ -6,6 +6,7 @@
 
 #include "dermis/dermis.h"
 
+// What the library exports.
 #if defined(DERMIS_STATIC) || defined(DERMIS_CDEF)
 #define DERMIS_COMPARE_API
 #elif defined(_WIN32) && defined(DERMIS_BUILDS_C_COMPARE)
