@@ -174,8 +174,10 @@ part_libcxx() {
 }
 
 part_fuzz() {
-  build fuzz
-  for fuzzer in gltf_fuzz mesh_fuzz packed_mesh_fuzz; do
+  fuzzers="gltf_fuzz mesh_fuzz packed_mesh_fuzz c_calls_fuzz"
+  # shellcheck disable=SC2086 # several targets
+  build fuzz $fuzzers
+  for fuzzer in $fuzzers; do
     corpus=build/fuzz/corpus/$fuzzer
     mkdir -p "$corpus"
     echo "$fuzzer ..."
