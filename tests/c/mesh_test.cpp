@@ -222,6 +222,11 @@ TEST(CMeshTest, PointersSizesAndEnumsAreChecked) {
   view.normals.type = static_cast<dermis_component>(256);  // 0 as a byte
   expectError(dermis_pack(&view, 8, &packed, &error), "component type of an attribute is 256");
   dermis_layout layout{};
+  const std::uint32_t large = 0x80000001;  // no enumerator, and not a value of the type
+  std::memcpy(&layout.tangents, &large, sizeof(large));
+  dermis_places unplaced{};
+  expectError(dermis_place_vertices(&layout, 1, 0, &unplaced, &error), "tangents is 2147483649");
+  layout = {};
   layout.normals = static_cast<dermis_format>(257);
   dermis_places places{};
   expectError(dermis_place_vertices(&layout, 1, 0, &places, &error),
@@ -316,6 +321,9 @@ TEST(CMeshTest, TheReferenceIsThatOfCpp) {
   view.positions = {stored.data(), 8, DERMIS_FORMAT_SNORM16X4};
   expectOk(dermis_compare(&posed, &view, &comparison, &error));
   EXPECT_EQ(comparison.passed, 1u);
+  stored[0] = static_cast<std::int16_t>(stored[0] / 2 + 1000);
+  expectOk(dermis_compare(&posed, &view, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 0u) << "the box is not that of the view";
   view.vertex_count = 49;
   expectError(dermis_compare(&posed, &view, &comparison, &error), "");
 }

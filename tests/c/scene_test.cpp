@@ -277,7 +277,10 @@ TEST(CSceneTest, AFailedChangeKeepsThoseBeforeIt) {
       changes[i].what = DERMIS_CHANGE_VISIBLE;
     }
     if (wrong == 0) {
-      changes[1].what |= DERMIS_CHANGE_UPDATE_INTERVAL;  // of 0: the scene refuses it
+      static const dermis_morph_weight missing = {99, 1};  // the scene refuses it
+      changes[1].what |= DERMIS_CHANGE_MORPHS;
+      changes[1].morphs = &missing;
+      changes[1].morph_count = 1;
     } else {
       changes[1].what |= 256;
     }

@@ -76,7 +76,9 @@ dermis_code createBuffer(void* user, const dermis_scene_buffer* wanted, void** m
   expect(!engine.buffers.contains(wanted->number));
   if (engine.failures > 0) {
     --engine.failures;
-    engine.codes->insert(engine.failure);
+    const bool isOfDermis =
+        engine.failure >= DERMIS_INVALID_ARGUMENT && engine.failure <= DERMIS_IO_ERROR;
+    engine.codes->insert(isOfDermis ? engine.failure : DERMIS_VULKAN_ERROR);
     // A message, sometimes, without a zero at its end.
     if (engine.mapped != 0) std::memset(error->message, 'x', sizeof(error->message));
     return engine.failure;

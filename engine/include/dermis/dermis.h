@@ -10,8 +10,7 @@
 //   say otherwise.
 // - A structure that begins with `size` may grow. The caller sets `size` to its sizeof, also in
 //   structures that a function fills. All elements of an array have the same `size`.
-// - Zero is the default of every other member: a structure of zeros with its `size` is valid,
-// except
+// - Zero is the default of every other member: a structure of zeros with its `size` is valid, but
 //   for what is marked as required.
 // - Nothing is kept of a pointer after the function returns, unless it says so. Lists that a
 //   function returns belong to the object; the function says how long they are valid.
@@ -22,13 +21,13 @@
 // - Callbacks get their `user` pointer first, and must not throw or longjmp. If one that creates
 //   something fails, the function that needs it fails with its code and error; a code that is not
 //   from `DERMIS_INVALID_ARGUMENT` to `DERMIS_IO_ERROR` counts as `DERMIS_VULKAN_ERROR`.
-// - If memory runs out, a function fails with `DERMIS_OUT_OF_MEMORY`; the object that was changed
-//   may then only be destroyed.
+// - If memory of the library runs out, a function fails with `DERMIS_OUT_OF_MEMORY`; the object
+//   that was changed may then only be destroyed.
 #ifndef DERMIS_DERMIS_H
 #define DERMIS_DERMIS_H
 
-#ifndef DERMIS_CDEF  // cffi's declarations (dermis.cdef.h) are made with this, and have no
-                     // directives
+// With DERMIS_CDEF, declarations alone: dermis.cdef.h, for cffi.
+#ifndef DERMIS_CDEF
 #include <stddef.h>
 #include <stdint.h>
 #ifdef DERMIS_VULKAN
@@ -466,7 +465,7 @@ typedef struct dermis_change {
   uint32_t what;  // of `dermis_change_bits`
   dermis_instance instance;
   uint32_t visible;
-  uint32_t update_interval;
+  uint32_t update_interval;  // 0: 1
   dermis_method method;
   dermis_mesh mesh;
   dermis_pose pose;
@@ -475,7 +474,7 @@ typedef struct dermis_change {
   uint32_t morph_count;
 } dermis_change;
 // Applies changes, one after the other. If one fails, those before it remain, those after it are
-// not applied, and the message begins with its index.
+// not applied, and the message begins with "change " and its index.
 DERMIS_C_API dermis_code dermis_change_instances(dermis_scene* scene, const dermis_change* changes,
                                                  uint32_t count, dermis_error* error);
 
@@ -484,7 +483,7 @@ DERMIS_C_API dermis_code dermis_change_instances(dermis_scene* scene, const derm
 DERMIS_C_API dermis_code dermis_compact(dermis_scene* scene, uint64_t max_bytes, uint64_t* moved,
                                         dermis_error* error);
 // States that the frame that was executed last will never reach the GPU, or that none of its jobs
-// is run. The scene is then as after `dermis_begin_frame`; everything is skinned again.
+// was or will be run. The scene is then as after `dermis_begin_frame`; everything is skinned again.
 DERMIS_C_API dermis_code dermis_abandon_frame(dermis_scene* scene, uint64_t frame,
                                               dermis_error* error);
 
@@ -582,14 +581,15 @@ typedef struct dermis_runner_frame {
 DERMIS_C_API dermis_code dermis_runner_jobs(dermis_runner* runner, uint32_t vertices_per_job,
                                             dermis_runner_frame* frame, dermis_error* error);
 // Runs job number `index` of the frame. The jobs of a frame may run on any threads, in any order
-// and at the same time, each once.
+// and at the same time, each once: a second run would change previous positions.
 DERMIS_C_API dermis_code dermis_run_job(const dermis_runner* runner, uint32_t index,
                                         dermis_error* error);
 
 // ---- Commands: a batch that the engine keeps the books of, or a scene for an engine with its own
 // RHI. `dermis_record_plan` records those of a batch.
 
-// Limits of a device (plan.h). 0: what every Vulkan device has. `dermis_context_create` fills them.
+// Limits of a device (plan.h). 0: what every Vulkan device has, which is too little for bounds
+// and positions in snorm16. `dermis_context_create` fills them.
 typedef struct dermis_limits {
   uint32_t size;
   uint32_t min_storage_buffer_offset_alignment;
@@ -796,10 +796,11 @@ typedef struct dermis_commands_desc {
   uint64_t output_offset;          // of the output, if it is a part of a larger buffer
   void* user;
   // Required. Creates a buffer; `mapped` gets the address of its first byte, or null. If it fails,
-  // the scene may ask for a smaller one.
+  // the scene may ask for a smaller one. Neither function may call the scene.
   dermis_code (*create_buffer)(void* user, const dermis_scene_buffer* buffer, void** mapped,
                                dermis_error* error);
-  // Required. Releases a buffer that no frame in flight uses.
+  // Required. Releases a buffer that no frame in flight uses. Buffers that remain when the
+  // commands are destroyed are not released.
   void (*release_buffer)(void* user, uint32_t number);
 } dermis_commands_desc;
 // Owns a scene, and lists the commands of its frames.

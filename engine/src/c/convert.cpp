@@ -41,21 +41,21 @@ Capacity capacityOf(const dermis_capacity& capacity, const Capacity& defaults) {
   return result;
 }
 
-VertexFormat formatOf(dermis_format format, const char* name) {
+VertexFormat formatOf(const dermis_format& format, const char* name) {
   return static_cast<VertexFormat>(enumerator(format, DERMIS_FORMAT_OCTAHEDRAL8X2, name));
 }
 
 }  // namespace
 
-Method methodOf(dermis_method method) {
+Method methodOf(const dermis_method& method) {
   const std::uint8_t number = enumerator(method, DERMIS_METHOD_BULGE_CONTROLLED, "the method");
   return number == 0 ? Method::dualQuaternion : static_cast<Method>(number - 1);
 }
 
 VertexLayout layoutOf(const dermis_layout& layout) {
   VertexLayout result;
-  if (layout.positions != DERMIS_FORMAT_NONE)
-    result.positions = formatOf(layout.positions, "the format of the positions");
+  const VertexFormat positions = formatOf(layout.positions, "the format of the positions");
+  if (positions != VertexFormat::none) result.positions = positions;
   result.normals = formatOf(layout.normals, "the format of the normals");
   result.tangents = formatOf(layout.tangents, "the format of the tangents");
   result.motion = layout.has_motion != 0;
@@ -64,7 +64,7 @@ VertexLayout layoutOf(const dermis_layout& layout) {
   return result;
 }
 
-JointPromise promiseOf(dermis_promise promise) {
+JointPromise promiseOf(const dermis_promise& promise) {
   return static_cast<JointPromise>(enumerator(promise, DERMIS_PROMISE_RIGID, "the promise"));
 }
 

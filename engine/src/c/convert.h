@@ -16,9 +16,9 @@
 
 namespace dermis::c {
 
-Method methodOf(dermis_method method);
+Method methodOf(const dermis_method& method);
 VertexLayout layoutOf(const dermis_layout& layout);
-JointPromise promiseOf(dermis_promise promise);
+JointPromise promiseOf(const dermis_promise& promise);
 Box boxOf(const dermis_box& box);
 dermis_box boxOf(const Box& box);
 VertexPlaces placesOf(const dermis_places& places);

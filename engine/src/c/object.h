@@ -115,6 +115,8 @@ std::vector<T> inArray(const T* first, std::uint32_t count, const char* name) {
   std::vector<T> copies;
   if (count == 0) return copies;
   const std::size_t stride = required(first, name).size;
+  if (stride % alignof(T) != 0)
+    fail(std::string(name) + ": its size is " + std::to_string(stride) + ", which is not aligned");
   copies.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     const void* element = reinterpret_cast<const std::byte*>(first) + i * stride;
@@ -137,10 +139,13 @@ void give(T* structure, T value) {
   std::memcpy(structure, &value, sizeof(T));
 }
 
-/// An enumerator of the caller: from 0 to `last`.
+/// An enumerator of the caller: from 0 to `last`. It is read as a number, since it may be none that
+/// the type can have.
 template <typename Enum>
-std::uint8_t enumerator(Enum value, Enum last, const char* name) {
-  const auto number = static_cast<std::uint32_t>(value);
+std::uint8_t enumerator(const Enum& value, Enum last, const char* name) {
+  std::uint32_t number = 0;
+  static_assert(sizeof(number) == sizeof(value));
+  std::memcpy(&number, &value, sizeof(number));
   if (number > static_cast<std::uint32_t>(last))
     fail(std::string(name) + " is " + std::to_string(number) + ", which has no meaning");
   return static_cast<std::uint8_t>(number);

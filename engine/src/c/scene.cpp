@@ -17,7 +17,8 @@ InstanceChange changeOf(const dermis_change& change) {
   if (change.what >= DERMIS_CHANGE_TELEPORT * 2u) fail("`what` has a bit that has no meaning");
   result.instance = handleOf(change.instance);
   if (has(DERMIS_CHANGE_VISIBLE)) result.visible = change.visible != 0;
-  if (has(DERMIS_CHANGE_UPDATE_INTERVAL)) result.updateInterval = change.update_interval;
+  if (has(DERMIS_CHANGE_UPDATE_INTERVAL))
+    result.updateInterval = change.update_interval == 0 ? 1 : change.update_interval;
   if (has(DERMIS_CHANGE_MESH)) result.mesh = handleOf(change.mesh);
   if (has(DERMIS_CHANGE_POSE)) result.pose = handleOf(change.pose);
   if (has(DERMIS_CHANGE_METHOD)) result.method = methodOf(change.method);

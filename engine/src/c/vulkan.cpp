@@ -58,7 +58,7 @@ struct EngineBuffers {
   }
 };
 
-std::optional<bool> choiceOf(dermis_choice choice, const char* name) {
+std::optional<bool> choiceOf(const dermis_choice& choice, const char* name) {
   const std::uint8_t number = enumerator(choice, DERMIS_CHOICE_YES, name);
   if (number == DERMIS_CHOICE_DEFAULT) return std::nullopt;
   return number == DERMIS_CHOICE_YES;
