@@ -1,0 +1,247 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "core/text.h"
+#include "dermis/verify.h"
+#include "strict_floating_point.h"
+#include "verify/pose_hypotheses.h"
+#include "verify/pose_probe.h"
+
+namespace dermis {
+namespace {
+
+using diagnosis::Hypothesis;
+using diagnosis::Pose;
+using diagnosis::PoseProbe;
+using diagnosis::PoseScore;
+using diagnosis::Skeleton;
+
+/// Poses are equal if no vertex differs by more, in sizes of the posed mesh.
+constexpr double sameVertex = 0.01;
+// Measured: tests/unit/diagnose_models_test.cpp prints the scores of all sound poses.
+constexpr double maxStretch = 0.5;
+constexpr double maxApart = 0.5;
+
+bool isPlausible(const PoseScore& score) {
+  return score.stretch <= maxStretch && score.apart <= maxApart;
+}
+
+/// The largest distance between vertices of the two poses, in sizes of the first one.
+double differenceOf(const PoseProbe& probe, const std::vector<glm::dvec3>& expected,
+                    const Pose& pose) {
+  const std::vector<glm::dvec3> positions = probe.skin(pose);
+  double largest = 0;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const double difference = glm::distance(expected[i], positions[i]);
+    // NaN counts as infinite.
+    largest = difference <= largest ? largest : difference;
+    if (!std::isfinite(largest)) return std::numeric_limits<double>::infinity();
+  }
+  return largest / std::max(diagnosis::sizeOf(expected), 1e-30);
+}
+
+/// The mistake that turns the right pose into this one.
+const Hypothesis* findMaker(const PoseProbe& probe, const std::vector<Hypothesis>& hypotheses,
+                            const Pose& right, const Pose& pose) {
+  const std::vector<glm::dvec3> positions = probe.skin(pose);
+  const Hypothesis* best = nullptr;
+  double least = sameVertex;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    if (!hypothesis.make) continue;
+    const std::optional<Pose> made = hypothesis.make(right);
+    if (!made) continue;
+    const double difference = differenceOf(probe, positions, *made);
+    // Of equal ones the first counts.
+    if (difference < least - 1e-4) {
+      least = difference;
+      best = &hypothesis;
+    }
+  }
+  return best;
+}
+
+/// Whether the local transforms may be wrong by this mistake, too.
+bool isInLocals(PoseMistake mistake) {
+  return mistake == PoseMistake::units || mistake == PoseMistake::axes ||
+         mistake == PoseMistake::quaternionOrder;
+}
+
+struct Mended {
+  PoseMistake mistake = PoseMistake::unknown;
+  std::string message;
+  PoseScore score{std::numeric_limits<double>::infinity(), 0, 0};
+
+  void offer(PoseMistake by, const std::string& text, const PoseScore& with) {
+    if (!isPlausible(with) || !(with.total() < score.total() - 1e-4)) return;
+    mistake = by;
+    message = text;
+    score = with;
+  }
+};
+
+/// The mesh with the weights of set order[i] for the joints of set i.
+std::vector<InfluenceSet> reorderedSets(const MeshView& mesh, std::span<const std::size_t> order) {
+  std::vector<InfluenceSet> sets(mesh.influenceSets.begin(), mesh.influenceSets.end());
+  for (std::size_t i = 0; i < sets.size(); ++i)
+    sets[i].weights = mesh.influenceSets[order[i]].weights;
+  return sets;
+}
+
+void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleton& skeleton,
+                     const Pose& pose, Mended& mended) {
+  const std::size_t count = mesh.influenceSets.size();
+  for (std::size_t a = 0; a < count; ++a) {
+    for (std::size_t b = a + 1; b < count; ++b) {
+      std::vector<std::size_t> order(count);
+      for (std::size_t i = 0; i < count; ++i) order[i] = i == a ? b : i == b ? a : i;
+      const std::vector<InfluenceSet> sets = reorderedSets(mesh, order);
+      MeshView other = mesh;
+      other.influenceSets = sets;
+      if (!validate(other, static_cast<std::uint32_t>(pose.size())).packable()) continue;
+      const PoseProbe probe(other, input.triangles);
+      mended.offer(PoseMistake::weightSet,
+                   "the weights of influence set " + std::to_string(b) +
+                       " are read for the joints of set " + std::to_string(a) +
+                       ": use influenceSets[" + std::to_string(a) + "].weights = WEIGHTS_" +
+                       std::to_string(a) + " and influenceSets[" + std::to_string(b) +
+                       "].weights = WEIGHTS_" + std::to_string(b),
+                   probe.score(pose, skeleton.bind));
+    }
+  }
+}
+
+Mended findMend(const MeshView& mesh, const PoseInput& input, const Skeleton& skeleton,
+                const PoseProbe& probe, const std::vector<Hypothesis>& hypotheses, const Pose& pose,
+                bool consistent) {
+  Mended mended;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    if (!hypothesis.undo || (consistent && !isInLocals(hypothesis.mistake))) continue;
+    const std::optional<Pose> undone = hypothesis.undo(pose);
+    if (undone) {
+      mended.offer(hypothesis.mistake, hypothesis.message, probe.score(*undone, skeleton.bind));
+    }
+  }
+  offerWeightSets(mesh, input, skeleton, pose, mended);
+  return mended;
+}
+
+Result<void> checkInput(const MeshView& mesh, const PoseInput& input) {
+  const std::size_t count = input.jointMatrices.size();
+  if (count == 0 || count > maxPoseJoints) {
+    return Error{ErrorCode::invalidArgument,
+                 "PoseInput::jointMatrices has " + std::to_string(count) + " elements"};
+  }
+  if (const Result<void> accepted =
+          validate(mesh, static_cast<std::uint32_t>(count)).accepted();
+      !accepted) {
+    return accepted;
+  }
+  const auto outside = std::ranges::find_if(
+      input.triangles, [&mesh](std::uint32_t vertex) { return vertex >= mesh.vertexCount; });
+  if (input.triangles.size() % 3 != 0 || outside != input.triangles.end()) {
+    return Error{ErrorCode::invalidArgument,
+                 "mesh " + inQuotes(mesh.name) +
+                     ": PoseInput::triangles are not 3 vertices of the mesh for each triangle"};
+  }
+  return {};
+}
+
+}  // namespace
+
+const char* poseMistakeName(PoseMistake mistake) {
+  switch (mistake) {
+    case PoseMistake::none:
+      return "none";
+    case PoseMistake::unknown:
+      return "unknown";
+    case PoseMistake::transposed:
+      return "transposed matrices";
+    case PoseMistake::columnMajor:
+      return "column-major floats";
+    case PoseMistake::inverseBindMissing:
+      return "inverse bind matrix missing";
+    case PoseMistake::inverseBindTwice:
+      return "inverse bind matrix twice";
+    case PoseMistake::inverseBindWrongSide:
+      return "inverse bind matrix on the wrong side";
+    case PoseMistake::jointsInNodeOrder:
+      return "joints in the order of nodes";
+    case PoseMistake::jointsSortedByName:
+      return "joints sorted by name";
+    case PoseMistake::jointsOffByOne:
+      return "joints off by one";
+    case PoseMistake::rootMissing:
+      return "root transform missing";
+    case PoseMistake::rootTwice:
+      return "root transform twice";
+    case PoseMistake::units:
+      return "units";
+    case PoseMistake::axes:
+      return "handedness or up axis";
+    case PoseMistake::quaternionOrder:
+      return "quaternion order";
+    case PoseMistake::weightSet:
+      return "weights of another set";
+  }
+  return "unknown";
+}
+
+Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
+  if (const Result<void> valid = checkInput(mesh, input); !valid) return valid.error();
+  const Result<Skeleton> skeleton = diagnosis::skeletonOf(input);
+  if (!skeleton) return skeleton.error();
+
+  Diagnosis result;
+  result.notTested = diagnosis::untested(input, mesh);
+  Pose pose;
+  for (const JointMatrix& matrix : input.jointMatrices) {
+    pose.push_back(diagnosis::toAffine(matrix));
+    if (diagnosis::isFinite(pose.back())) continue;
+    result.mistake = PoseMistake::unknown;
+    result.message = "joint " + std::to_string(pose.size() - 1) +
+                     " has a matrix that is not finite: check what computes jointMatrices[" +
+                     std::to_string(pose.size() - 1) + "]";
+    return result;
+  }
+  const PoseProbe probe(mesh, input.triangles);
+  const PoseScore score = probe.score(pose, skeleton->bind);
+  result.stretch = result.mendedStretch = score.stretch;
+  const std::vector<Hypothesis> hypotheses = diagnosis::hypothesesFor(*skeleton);
+  bool consistent = false;
+  if (skeleton->isComplete()) {
+    const Pose right = rebuild(*skeleton, globalsOf(*skeleton, skeleton->locals));
+    consistent = differenceOf(probe, probe.skin(pose), right) <= sameVertex;
+    const Hypothesis* maker =
+        consistent ? nullptr : findMaker(probe, hypotheses, right, pose);
+    if (maker != nullptr) {
+      result.mistake = maker->mistake;
+      result.message = maker->message;
+      result.mendedStretch = probe.score(right, skeleton->bind).stretch;
+      return result;
+    }
+  }
+  if (isPlausible(score)) return result;
+  const Mended mended =
+      findMend(mesh, input, *skeleton, probe, hypotheses, pose, consistent);
+  result.mistake = mended.mistake;
+  result.message = mended.message;
+  if (mended.mistake == PoseMistake::unknown) {
+    result.message =
+        "the pose tears the mesh, but none of the tested mistakes explains it: pass what "
+        "notTested names";
+  } else {
+    result.mendedStretch = mended.score.stretch;
+  }
+  return result;
+}
+
+}  // namespace dermis
