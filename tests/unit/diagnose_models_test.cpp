@@ -407,6 +407,7 @@ Diagnosis diagnosed(const PosedPart& part, const Wrong& wrong, Known known) {
     input.parents = part.parents;
     if (known == Known::all) input.localTransforms = locals;
   }
+  if (std::getenv("DBG")) std::fprintf(stderr, "CASE %d|%s|%s|%s|", static_cast<int>(known), poseMistakeName(wrong.mistake), wrong.form.c_str(), part.primitive->name.c_str());
   const Result<Diagnosis> result = diagnose(mesh, input);
   EXPECT_TRUE(result) << (result ? "" : result.error().message);
   return result ? *result : Diagnosis();
@@ -560,6 +561,7 @@ TEST(DiagnoseModelsTest, SoundPosesHaveNoFinding) {
 TEST(DiagnoseModelsTest, MistakesAreNamed) {
   const auto data = testDataFolder();
   if (!data) GTEST_SKIP() << noTestData;
+  if (std::getenv("DBG")) { Table t; forEachPose(*data, 4, std::array{0.3, 0.7}, [&](const PosedPart& part, const std::string&) { countMistakes(part, Known::skeleton, t); }); return; }
   for (const auto& [title, known] :
        {std::pair("Everything is known", Known::all), std::pair("No local transforms", Known::skeleton),
         std::pair("Only joint matrices and triangles", Known::matrices)}) {

@@ -198,6 +198,14 @@ class Builder {
     add(mistake, message, make, undo);
   }
 
+  /// A change of the whole skeleton: of joint matrices and inverse bind matrices, or of the first
+  /// only; and of the globals.
+  void addSkeleton(PoseMistake mistake, const std::string& message, const Change& make,
+                   const Change& undo) {
+    addBoth(mistake, message, make, undo);
+    if (hasBind()) hypotheses_.push_back({mistake, message, {}, undo, undo});
+  }
+
   void addTransposed() {
     add(PoseMistake::transposed,
         "the joint matrices are transposed, which loses their translations: use "
@@ -377,7 +385,7 @@ class Builder {
       const auto scaled = [](double by) {
         return each([by](const Affine& a) { return Affine{a.linear, a.translation * by}; });
       };
-      addBoth(PoseMistake::units, message, scaled(factor), scaled(1 / factor));
+      addSkeleton(PoseMistake::units, message, scaled(factor), scaled(1 / factor));
       if (!skeleton_.isComplete()) continue;
       add(PoseMistake::units, message, each([factor](const Affine& a) {
             return Affine{a.linear * factor, a.translation * factor};
@@ -420,7 +428,7 @@ class Builder {
       const auto between = [](const Affine& a, const Affine& b) {
         return each([a, b](const Affine& m) { return a * m * b; });
       };
-      addBoth(PoseMistake::axes, message, between(to, back), between(back, to));
+      addSkeleton(PoseMistake::axes, message, between(to, back), between(back, to));
       if (skeleton_.isComplete()) {
         add(PoseMistake::axes, message, each([to](const Affine& m) { return to * m; }), {});
       }

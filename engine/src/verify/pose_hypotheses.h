@@ -46,6 +46,7 @@ struct Hypothesis {
   std::string message;
   Change make;  ///< from the right pose to the wrong one; empty if it cannot be computed
   Change undo;  ///< from the wrong pose to the right one; empty if there is nothing to measure
+  Change undoBind = {};  ///< the same for inverse bind matrices; empty if they are right
 };
 
 /// All that can be tested with this skeleton. Those that are more likely come first.

@@ -23,14 +23,22 @@ constexpr std::size_t maxReadEdges = 20'000;
 constexpr std::size_t maxEdges = 1'500;
 /// Edges count as at least so long, in mesh sizes: the stretch of tiny ones is not seen.
 constexpr double shortestEdge = 0.01;
+/// A joint is loose if it is further from where its parent takes it, in lengths of its bone.
+constexpr double looseJoint = 0.05;
+/// Joints count as at least so far from the middle of the mesh, in mesh sizes.
+constexpr double leastSpread = 0.1;
 
 /// The squares of the columns' lengths, as a mean: the scale of a joint, squared.
 double squaredScale(const dmat3& m) {
   return (glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2])) / 3;
 }
 
-double distance(const dmat3& a, const dmat3& b) {
-  return std::sqrt(3 * squaredScale(a - b));
+/// The angle between two rotations with scale, as a share of 180°.
+double angleBetween(const dmat3& a, const dmat3& b) {
+  const double scales = 3 * std::sqrt(squaredScale(a) * squaredScale(b));
+  const double trace = glm::dot(a[0], b[0]) + glm::dot(a[1], b[1]) + glm::dot(a[2], b[2]);
+  const double cosine = scales > 0 ? (3 * trace / scales - 1) / 2 : 1;
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) / std::acos(-1.0);
 }
 
 std::vector<std::pair<std::uint32_t, std::uint32_t>> edgesOfTriangles(
@@ -147,6 +155,7 @@ PoseProbe::PoseProbe(const MeshView& mesh, std::span<const std::uint32_t> triang
   std::vector<Edge> edges = edgesOfTriangles(triangles);
   if (edges.empty()) edges = edgesOfNeighbors(mesh, low, high - low);
   keepEdges(mesh, edges);
+  findCenters(mesh);
 }
 
 void PoseProbe::keepEdges(const MeshView& mesh, const std::vector<Edge>& edges) {
@@ -203,9 +212,88 @@ std::vector<dvec3> PoseProbe::skin(const Pose& pose) const {
   return positions;
 }
 
+void PoseProbe::findCenters(const MeshView& mesh) {
+  std::map<std::uint32_t, Moved> moved;
+  std::vector<reference::Influence> influences;
+  const std::size_t step = std::max<std::size_t>(1, mesh.vertexCount / maxReadEdges);
+  for (std::size_t vertex = 0; vertex < mesh.vertexCount; vertex += step) {
+    reference::readInfluences(mesh, vertex, influences);
+    const dvec3 position = reference::readPosition(mesh, vertex);
+    for (const reference::Influence& influence : influences) {
+      Moved& joint = moved.try_emplace(influence.joint, Moved{influence.joint, 0, dvec3(0)})
+                         .first->second;
+      joint.weight += influence.weight;
+      joint.center += influence.weight * position;
+    }
+  }
+  for (auto& [number, joint] : moved) {
+    if (!(joint.weight > 0)) continue;
+    joint.center /= joint.weight;
+    moved_.push_back(joint);
+  }
+}
+
+double PoseProbe::stretchOf(const Pose& pose, double scale) const {
+  const std::vector<dvec3> posed = skin(pose);
+  const double shortest = shortestEdge * meshSize_;
+  double sum = 0;
+  for (const auto& [a, b] : edges_) {
+    const double bind = glm::distance(vertices_[a].position, vertices_[b].position);
+    const double now = glm::distance(posed[a], posed[b]) / scale;
+    sum += std::abs(std::log((now + shortest) / (bind + shortest)));
+  }
+  return edges_.empty() ? 0 : sum / static_cast<double>(edges_.size());
+}
+
+void PoseProbe::addJoints(const Pose& pose, const BindSkeleton& skeleton, PoseScore& score) const {
+  std::size_t pairs = 0;
+  for (std::size_t joint = 0; joint < skeleton.parents.size(); ++joint) {
+    const std::uint32_t parent = skeleton.parents[joint];
+    if (parent == noJoint || !isFinite(pose[joint]) || !isFinite(pose[parent])) continue;
+    ++pairs;
+    score.bend += angleBetween(pose[joint].linear, pose[parent].linear);
+    if (skeleton.inverseBind.empty()) continue;
+    const double scale = std::sqrt(squaredScale(pose[parent].linear));
+    const dvec3 place = inverse(skeleton.inverseBind[joint]).translation;
+    const dvec3 origin = inverse(skeleton.inverseBind[parent]).translation;
+    const dvec3 there = pose[joint].linear * place + pose[joint].translation;
+    const dvec3 expected = pose[parent].linear * place + pose[parent].translation;
+    const double bone = std::max(glm::distance(place, origin), shortestEdge * meshSize_);
+    const double moved = glm::distance(there, expected) / (scale * bone);
+    score.apart += moved < 1 ? moved : 1;
+    score.loose += moved < looseJoint ? 0 : 1;
+  }
+  if (pairs == 0) return;
+  score.bend /= static_cast<double>(pairs);
+  score.apart /= static_cast<double>(pairs);
+  score.loose /= static_cast<double>(pairs);
+}
+
+double PoseProbe::misfitOf(const BindSkeleton& skeleton) const {
+  if (skeleton.inverseBind.empty() || moved_.size() < 2) return 0;
+  dvec3 middle(0);
+  double weight = 0;
+  for (const Moved& joint : moved_) {
+    middle += joint.weight * joint.center;
+    weight += joint.weight;
+  }
+  middle /= weight;
+  double away = 0, spread = 0;
+  for (const Moved& joint : moved_) {
+    const dvec3 off =
+        inverse(skeleton.inverseBind[joint.joint]).translation - joint.center;
+    const dvec3 out = joint.center - middle;
+    away += joint.weight * glm::dot(off, off);
+    spread += joint.weight * glm::dot(out, out);
+  }
+  // Of a mesh with few joints they may be near each other.
+  const double least = leastSpread * meshSize_;
+  return std::sqrt(away / (spread + weight * least * least));
+}
+
 PoseScore PoseProbe::score(const Pose& pose, const BindSkeleton& skeleton) const {
   PoseScore score;
-  const PoseScore bad{std::numeric_limits<double>::infinity(), 0, 0};
+  const PoseScore bad{std::numeric_limits<double>::infinity(), 0, 0, 0, 0};
   // The scale of the whole model: of a joint in the middle.
   std::vector<double> scales;
   for (const std::uint32_t joint : usedJoints_) {
@@ -215,34 +303,10 @@ PoseScore PoseProbe::score(const Pose& pose, const BindSkeleton& skeleton) const
   if (scales.empty() || !(meshSize_ > 0)) return score;
   const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
   std::ranges::nth_element(scales, middle);
-  const double scale = *middle;
-  if (!(scale > 0)) return bad;
-
-  const std::vector<dvec3> posed = skin(pose);
-  const double shortest = shortestEdge * meshSize_;
-  for (const auto& [a, b] : edges_) {
-    const double bind = glm::distance(vertices_[a].position, vertices_[b].position);
-    const double now = glm::distance(posed[a], posed[b]) / scale;
-    score.stretch += std::abs(std::log((now + shortest) / (bind + shortest)));
-  }
-  if (!edges_.empty()) score.stretch /= static_cast<double>(edges_.size());
-
-  std::size_t pairs = 0;
-  for (const std::uint32_t joint : usedJoints_) {
-    const std::uint32_t parent = skeleton.parents.empty() ? noJoint : skeleton.parents[joint];
-    if (parent == noJoint || !isFinite(pose[parent])) continue;
-    ++pairs;
-    score.bend += distance(pose[joint].linear, pose[parent].linear) / scale / std::sqrt(8.0);
-    if (skeleton.inverseBind.empty()) continue;
-    const dvec3 place = inverse(skeleton.inverseBind[joint]).translation;
-    const dvec3 there = pose[joint].linear * place + pose[joint].translation;
-    const dvec3 expected = pose[parent].linear * place + pose[parent].translation;
-    score.apart += glm::distance(there, expected) / scale / meshSize_;
-  }
-  if (pairs != 0) {
-    score.bend /= static_cast<double>(pairs);
-    score.apart /= static_cast<double>(pairs);
-  }
+  if (!(*middle > 0)) return bad;
+  score.stretch = stretchOf(pose, *middle);
+  addJoints(pose, skeleton, score);
+  score.misfit = misfitOf(skeleton);
   return score;
 }
 

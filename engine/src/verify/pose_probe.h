@@ -36,13 +36,17 @@ struct BindSkeleton {
   std::vector<std::uint32_t> parents;  ///< the nearest joint above, or `noJoint`
 };
 
-/// How far a pose is from a sound one. All are 0 in bind pose, and do not depend on a transform of
-/// the whole model or on its size.
+/// How far a pose is from a sound one. All are 0 in bind pose except `misfit`, and do not depend on
+/// a transform of the whole model or on its size.
 struct PoseScore {
   double stretch = 0;  ///< mean of |log| of the edges' lengths against those in bind pose
-  double apart = 0;    ///< mean distance of a joint from where its parent takes it, in mesh sizes
-  double bend = 0;     ///< mean difference of a joint's 3×3 matrix from its parent's
-  double total() const { return stretch + apart + bend / 4; }
+  /// Mean distance of a joint from where its parent takes it, in lengths of its bone, at most 1.
+  double apart = 0;
+  double loose = 0;  ///< share of joints that are not where their parents take them
+  double bend = 0;   ///< mean angle between a joint and its parent, against bind pose: 1 is 180°
+  /// How far joints are from the vertices that they move, in bind pose: 0 if each joint is in the
+  /// middle of its vertices, 1 if all joints were in the middle of the mesh.
+  double misfit = 0;
 };
 
 class PoseProbe {
@@ -70,11 +74,21 @@ class PoseProbe {
 
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
   void keepEdges(const MeshView& mesh, const std::vector<Edge>& edges);
+  void findCenters(const MeshView& mesh);
+  double stretchOf(const Pose& pose, double scale) const;
+  void addJoints(const Pose& pose, const BindSkeleton& skeleton, PoseScore& score) const;
+  double misfitOf(const BindSkeleton& skeleton) const;
 
   std::vector<Vertex> vertices_;
   std::vector<Weight> weights_;
   std::vector<Edge> edges_;  ///< pairs of sampled vertices
   std::vector<std::uint32_t> usedJoints_;
+  struct Moved {
+    std::uint32_t joint;
+    double weight;
+    glm::dvec3 center;
+  };
+  std::vector<Moved> moved_;  ///< by joint: the middle of its vertices
   double meshSize_ = 0;
 };
 
