@@ -61,6 +61,7 @@ using Run = std::function<ExitStatus()>;
 Run addBench(CLI::App& app);
 Run addCompare(CLI::App& app);
 Run addDevices(CLI::App& app);
+Run addDiagnose(CLI::App& app);
 Run addInfo(CLI::App& app);
 Run addRender(CLI::App& app);
 Run addSkin(CLI::App& app);

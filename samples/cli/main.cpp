@@ -21,12 +21,13 @@ ExitStatus run(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("dermis {}.{}.{}", DERMIS_VERSION_MAJOR,
                                                 DERMIS_VERSION_MINOR, DERMIS_VERSION_PATCH));
   app.footer(dermis::samples::exitStatusHelp);
-  const std::array<std::pair<const char*, dermis::cli::Run>, 7> commands{{
+  const std::array<std::pair<const char*, dermis::cli::Run>, 8> commands{{
       {"devices", dermis::cli::addDevices(app)},
       {"info", dermis::cli::addInfo(app)},
       {"skin", dermis::cli::addSkin(app)},
       {"render", dermis::cli::addRender(app)},
       {"verify", dermis::cli::addVerify(app)},
+      {"diagnose", dermis::cli::addDiagnose(app)},
       {"compare", dermis::cli::addCompare(app)},
       {"bench", dermis::cli::addBench(app)},
   }};

@@ -268,16 +268,17 @@ class Mistakes {
       const std::vector<std::uint32_t> other = path(joint);
       common.erase(std::ranges::mismatch(common, other).in1, common.end());
     }
-    if (common.empty()) return;
-    // Above the topmost joint; or that joint, if nothing is above it.
-    while (common.size() > 1 && std::ranges::count(part_.joints, common.back()) != 0)
-      common.pop_back();
-    const dmat4 transform = part_.globals[common.back()];
-    if (glm::determinant(dmat3(transform)) == 0) return;
-    const dmat4 back = glm::inverse(transform);
-    add(PoseMistake::rootMissing, "", each(part_.right, [&](const dmat4& m) { return back * m; }));
-    add(PoseMistake::rootTwice, "",
-        each(part_.right, [&](const dmat4& m) { return transform * m; }));
+    // From the scene's root to the joint above all others: an engine may mean any of them.
+    for (std::size_t depth = 0; depth < common.size(); ++depth) {
+      const dmat4 transform = part_.globals[common[depth]];
+      if (glm::determinant(dmat3(transform)) == 0) return;
+      const dmat4 back = glm::inverse(transform);
+      const std::string form = "of " + std::to_string(depth + 1) + " nodes";
+      add(PoseMistake::rootMissing, form,
+          each(part_.right, [&](const dmat4& m) { return back * m; }));
+      add(PoseMistake::rootTwice, form,
+          each(part_.right, [&](const dmat4& m) { return transform * m; }));
+    }
   }
 
   /// Local transforms that are changed by a loader: `diagnose` gets the wrong ones. By the code that
@@ -407,7 +408,6 @@ Diagnosis diagnosed(const PosedPart& part, const Wrong& wrong, Known known) {
     input.parents = part.parents;
     if (known == Known::all) input.localTransforms = locals;
   }
-  if (std::getenv("DBG")) std::fprintf(stderr, "CASE %d|%s|%s|%s|", static_cast<int>(known), poseMistakeName(wrong.mistake), wrong.form.c_str(), part.primitive->name.c_str());
   const Result<Diagnosis> result = diagnose(mesh, input);
   EXPECT_TRUE(result) << (result ? "" : result.error().message);
   return result ? *result : Diagnosis();
@@ -420,8 +420,8 @@ struct Count {
 
 using Table = std::map<std::pair<PoseMistake, std::string>, Count>;
 
-void print(const char* title, const Table& table) {
-  std::printf("\n%s\n%-40s %-50s %6s %6s %8s %6s %7s  others\n", title, "mistake", "form", "cases",
+void print(const Table& table) {
+  std::printf("%-40s %-50s %6s %6s %8s %6s %7s  others\n", "mistake", "form", "cases",
               "small", "untested", "right", "%");
   for (const auto& [key, count] : table) {
     std::string others;
@@ -461,7 +461,8 @@ void countMistakes(const PosedPart& part, Known known, Table& table) {
       continue;
     }
     const Diagnosis diagnosis = diagnosed(part, wrong, known);
-    if (std::ranges::any_of(diagnosis.notTested,
+    if ((known != Known::all && wrong.form.ends_with("of the model")) ||
+        std::ranges::any_of(diagnosis.notTested,
                             [&](const auto& entry) { return entry.first == wrong.mistake; })) {
       ++count.untested;
       continue;
@@ -487,98 +488,130 @@ bool isModel(const std::filesystem::path& path) {
          path.generic_string().find("/negative_") == std::string::npos;
 }
 
-/// Calls with each skinned part of each model, in poses of all clips, or in its rest pose. Parts
-/// that share a skin and a mesh with others are taken once, at most `maxParts` of each model.
-/// Returns the number of models.
-int forEachPose(const std::filesystem::path& data, std::size_t maxParts,
-                std::span<const double> times,
+/// Which of the poses are used.
+struct Choice {
+  std::size_t everyModel = 1;
+  std::size_t maxParts = 1000;  ///< of a model
+  std::vector<double> times;    ///< in durations of the clip
+};
+
+PosedPart partOf(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
+                 const MeshView& mesh) {
+  PosedPart part;
+  part.model = &model;
+  part.primitive = &model.meshes[source.mesh].primitives[source.primitive];
+  part.mesh = mesh;
+  const gltf::Skin& skin = model.skins[source.skin];
+  part.joints = skin.joints;
+  for (const gltf::Node& node : model.nodes) part.parents.push_back(node.parent);
+  for (const std::uint32_t joint : skin.joints) part.names.push_back(model.nodes[joint].name);
+  for (const JointMatrix& matrix : skin.inverseBindMatrices)
+    part.inverseBind.push_back(matrixOf(matrix.m));
+  return part;
+}
+
+/// Calls with the skinned parts of the models, in poses of all clips, or in the rest pose of a model
+/// without clips. Returns the number of models.
+int forEachPose(const std::filesystem::path& data, const Choice& choice,
                 const std::function<void(const PosedPart&, const std::string&)>& call) {
-  int models = 0;
   std::vector<std::filesystem::path> files;
   for (const auto& file : std::filesystem::recursive_directory_iterator(data / "models"))
     if (isModel(file.path())) files.push_back(file.path());
   std::ranges::sort(files);
-  for (const std::filesystem::path& file : files) {
-    const Result<gltf::Model> loaded = gltf::load(file);
-    if (!loaded) continue;
-    const gltf::Model& model = *loaded;
+  int models = 0;
+  for (std::size_t file = 0; file < files.size(); file += choice.everyModel) {
+    const Result<gltf::Model> model = gltf::load(files[file]);
+    if (!model) continue;
     std::size_t parts = 0;
-    for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
-      const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
-      const gltf::Skin& skin = model.skins[source.skin];
+    for (const gltf::SkinnedPrimitive& source : model->skinnedPrimitives) {
+      const gltf::Primitive& primitive = model->meshes[source.mesh].primitives[source.primitive];
       const gltf::PrimitiveView view(primitive);
-      PosedPart part;
-      part.model = &model;
-      part.primitive = &primitive;
-      part.mesh = view.mesh();
-      if (!validate(part.mesh, static_cast<std::uint32_t>(skin.joints.size())).packable()) continue;
-      if (++parts > maxParts) break;
-      part.joints = skin.joints;
-      for (const gltf::Node& node : model.nodes) part.parents.push_back(node.parent);
-      for (const std::uint32_t joint : skin.joints) part.names.push_back(model.nodes[joint].name);
-      for (const JointMatrix& matrix : skin.inverseBindMatrices)
-        part.inverseBind.push_back(matrixOf(matrix.m));
-      const auto clips = static_cast<std::uint32_t>(model.clips.size());
+      PosedPart part = partOf(*model, source, view.mesh());
+      if (!validate(part.mesh, static_cast<std::uint32_t>(part.joints.size())).packable()) continue;
+      if (++parts > choice.maxParts) break;
+      const auto clips = static_cast<std::uint32_t>(model->clips.size());
       for (std::uint32_t clip = 0; clip < std::max(clips, 1u); ++clip) {
-        const std::uint32_t played = clips == 0 ? gltf::none : clip;
-        for (const double time : times) {
-          pose(part, played, clips == 0 ? 0 : time * model.clips[clip].duration);
-          call(part, file.filename().string() + ", " + primitive.name + ", clip " +
+        for (const double time : choice.times) {
+          pose(part, clips == 0 ? gltf::none : clip,
+               clips == 0 ? 0 : time * model->clips[clip].duration);
+          call(part, files[file].filename().string() + ", " + primitive.name + ", clip " +
                          std::to_string(clip) + " at " + std::to_string(time));
           if (clips == 0) break;
         }
       }
     }
-    models += parts != 0 ? 1 : 0;
+    if (parts != 0) ++models;
   }
   return models;
 }
+
+#ifdef DERMIS_EXHAUSTIVE
+const Choice soundChoice{.times = {0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1}};
+const Choice wrongChoice{.maxParts = 4, .times = {0.3, 0.7}};
+#else
+const Choice soundChoice{.maxParts = 20, .times = {0, 0.2, 0.45, 0.7, 1}};
+const Choice wrongChoice{.everyModel = 3, .maxParts = 1, .times = {0.3}};
+#endif
 
 TEST(DiagnoseModelsTest, SoundPosesHaveNoFinding) {
   const auto data = testDataFolder();
   if (!data) GTEST_SKIP() << noTestData;
   int poses = 0;
-  std::vector<std::pair<double, std::string>> stretches;
-  const int models = forEachPose(
-      *data, 1000, std::array{0.0, 0.2, 0.45, 0.7, 1.0},
-      [&](const PosedPart& part, const std::string& name) {
+  const int models =
+      forEachPose(*data, soundChoice, [&](const PosedPart& part, const std::string& name) {
         ++poses;
+        const Wrong sound{.mistake = PoseMistake::none,
+                          .form = "",
+                          .pose = part.right,
+                          .inverseBind = part.inverseBind,
+                          .locals = part.locals,
+                          .sets = {}};
         for (const Known known : {Known::all, Known::skeleton, Known::matrices}) {
-          const Wrong sound{PoseMistake::none, "",          part.right, part.inverseBind,
-                            part.locals,       {}};
           const Diagnosis diagnosis = diagnosed(part, sound, known);
           EXPECT_TRUE(diagnosis.plausible()) << name << ": " << diagnosis.message;
-          stretches.emplace_back(diagnosis.stretch, name);
         }
       });
+  std::printf("%d sound poses of %d models\n", poses, models);
   EXPECT_GE(models, 15);
-  std::ranges::sort(stretches);
-  std::printf("%d sound poses of %d models; the largest stretches:\n", poses, models);
-  for (std::size_t i = stretches.size() - std::min<std::size_t>(12, stretches.size()); i < stretches.size(); i += 1)
-    std::printf("  %.3f %s\n", stretches[i].first, stretches[i].second.c_str());
+}
+
+/// The share of the cases that are named right, by what the engine knows.
+double namedRight(const char* title, Known known) {
+  const auto data = testDataFolder();
+  if (!data) return 1;
+  Table table;
+  const int models =
+      forEachPose(*data, wrongChoice, [&](const PosedPart& part, const std::string&) {
+        countMistakes(part, known, table);
+      });
+  EXPECT_GE(models, 15 / static_cast<int>(wrongChoice.everyModel));
+  std::printf("\n%s: %d models\n", title, models);
+  print(table);
+  const Table summed = byMistake(table);
+  print(summed);
+  const Count& all = summed.at({PoseMistake::none, "all"});
+  EXPECT_GT(all.cases, 0);
+  return static_cast<double>(all.right) / std::max(all.cases, 1);
 }
 
 TEST(DiagnoseModelsTest, MistakesAreNamed) {
-  const auto data = testDataFolder();
-  if (!data) GTEST_SKIP() << noTestData;
-  if (std::getenv("DBG")) { Table t; forEachPose(*data, 4, std::array{0.3, 0.7}, [&](const PosedPart& part, const std::string&) { countMistakes(part, Known::skeleton, t); }); return; }
-  for (const auto& [title, known] :
-       {std::pair("Everything is known", Known::all), std::pair("No local transforms", Known::skeleton),
-        std::pair("Only joint matrices and triangles", Known::matrices)}) {
-    Table table;
-    const int models = forEachPose(
-        *data, 4, std::array{0.3, 0.7},
-        [&](const PosedPart& part, const std::string&) { countMistakes(part, known, table); });
-    std::printf("%d models\n", models);
-    print(title, table);
-    print(title, byMistake(table));
-    const Count all = byMistake(table)[{PoseMistake::none, "all"}];
-    if (known == Known::all) {
-      EXPECT_GE(models, 15);
-      EXPECT_GE(all.right, 0.9 * all.cases);
-    }
-  }
+  if (!testDataFolder()) GTEST_SKIP() << noTestData;
+  EXPECT_GE(namedRight("Everything is known", Known::all), 0.9);
 }
+
+// Of the mistakes that can be tested then.
+TEST(DiagnoseModelsTest, MostAreNamedWithoutLocalTransforms) {
+  if (!testDataFolder()) GTEST_SKIP() << noTestData;
+  EXPECT_GE(namedRight("No local transforms", Known::skeleton), 0.8);
+}
+
+#ifdef DERMIS_EXHAUSTIVE
+// Few are: there is no bar. The table shows it.
+TEST(DiagnoseModelsTest, FewAreNamedWithoutASkeleton) {
+  if (!testDataFolder()) GTEST_SKIP() << noTestData;
+  namedRight("Only joint matrices and triangles", Known::matrices);
+}
+#endif
 
 }  // namespace
 }  // namespace dermis::test

@@ -2,8 +2,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <string>
@@ -15,6 +13,7 @@
 #include "core/text.h"
 #include "dermis/verify.h"
 #include "strict_floating_point.h"
+#include "verify/bind_vertex.h"
 #include "verify/pose_hypotheses.h"
 #include "verify/pose_probe.h"
 
@@ -29,29 +28,35 @@ using diagnosis::Skeleton;
 
 /// Poses are equal if no vertex differs by more, in sizes of the posed mesh.
 constexpr double sameVertex = 0.01;
-/// What is suspicious of a pose. Sound poses may be, too: a rig may stretch, and its joints may move
-/// apart. They have no finding, because no mistake explains them. Measured on the sound poses of
-/// tests/unit/diagnose_models_test.cpp.
-constexpr double maxStretch = 0.3, maxLoose = 0.1, maxBend = 0.55, maxMisfit = 0.6;
-/// A mistake explains it if undoing it leaves at most this share.
-constexpr double explainedShare = 0.35;
-/// More than that is wrong even if no mistake explains it.
+/// A measure of a pose. Above `suspicious` it is suspicious. Sound poses may be, too: a rig may
+/// stretch, and its joints may move apart. They have no finding, because no mistake explains them. A
+/// mistake does if undoing it leaves at most `explained` of the measure.
+/// The numbers are from the sound poses of tests/unit/diagnose_models_test.cpp.
+struct Measure {
+  double PoseScore::*value;
+  double suspicious;
+  double explained;
+};
+constexpr std::array<Measure, 4> measures{{{&PoseScore::stretch, 0.3, 0.35},
+                                           {&PoseScore::loose, 0.1, 0.35},
+                                           {&PoseScore::bend, 0.55, 0.6},
+                                           {&PoseScore::misfit, 0.6, 0.5}}};
+/// More stretch than that is wrong even if no mistake explains it.
 constexpr double tornStretch = 0.5;
 
 bool isSuspicious(const PoseScore& score) {
-  return score.stretch > maxStretch || score.loose > maxLoose || score.bend > maxBend ||
-         score.misfit > maxMisfit;
+  return std::ranges::any_of(measures, [&score](const Measure& measure) {
+    return score.*measure.value > measure.suspicious;
+  });
 }
 
 /// Whether a pose with the second score is right, if that with the first one is wrong.
 bool explains(const PoseScore& wrong, const PoseScore& right) {
   bool better = false;
-  for (const auto& [before, after, limit] :
-       {std::array{wrong.stretch, right.stretch, maxStretch},
-        std::array{wrong.loose, right.loose, maxLoose}, std::array{wrong.bend, right.bend, maxBend},
-        std::array{wrong.misfit, right.misfit, maxMisfit}}) {
-    if (!(after <= std::max(before, limit))) return false;
-    better = better || (before > limit && after <= explainedShare * before);
+  for (const auto& [value, suspicious, explained] : measures) {
+    const double before = wrong.*value, after = right.*value;
+    if (!(after <= std::max(before, suspicious))) return false;
+    better = better || (before > suspicious && after <= explained * before);
   }
   return better;
 }
@@ -100,21 +105,38 @@ bool isInLocals(PoseMistake mistake) {
          mistake == PoseMistake::quaternionOrder;
 }
 
+/// The weights of the later set are larger; or no joint has a translation.
+constexpr double withOtherEvidence = 0.5;
+
 struct Mended {
   PoseMistake mistake = PoseMistake::unknown;
   std::string message;
   PoseScore score;
   double cost = std::numeric_limits<double>::infinity();
 
+  /// `doubt` is smaller if there is other evidence for the mistake.
   void offer(PoseMistake by, const std::string& text, const PoseScore& wrong,
-             const PoseScore& with) {
-    if (!explains(wrong, with) || !(costOf(with) < cost - 1e-4)) return;
-    cost = costOf(with);
+             const PoseScore& with, double doubt = 1) {
+    const double newCost = doubt * costOf(with);
+    if (!explains(wrong, with) || !(newCost < cost - 1e-4)) return;
+    cost = newCost;
     mistake = by;
     message = text;
     score = with;
   }
 };
+
+/// Of a sample of vertices. Exporters write the largest weights to the first set.
+double sumOfWeights(const MeshView& mesh, std::size_t set) {
+  const AttributeView& weights = mesh.influenceSets[set].weights;
+  const std::size_t step = std::max<std::size_t>(1, mesh.vertexCount / 1000);
+  double sum = 0;
+  for (std::size_t vertex = 0; vertex < mesh.vertexCount; vertex += step) {
+    for (std::uint32_t i = 0; i < weights.components; ++i)
+      sum += reference::readComponent(weights, vertex, i);
+  }
+  return sum;
+}
 
 /// The mesh with the weights of set order[i] for the joints of set i.
 std::vector<InfluenceSet> reorderedSets(const MeshView& mesh, std::span<const std::size_t> order) {
@@ -142,7 +164,8 @@ void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleto
                        ": use influenceSets[" + std::to_string(a) + "].weights = WEIGHTS_" +
                        std::to_string(a) + " and influenceSets[" + std::to_string(b) +
                        "].weights = WEIGHTS_" + std::to_string(b),
-                   wrong, probe.score(pose, skeleton.bind));
+                   wrong, probe.score(pose, skeleton.bind),
+                   sumOfWeights(mesh, a) < sumOfWeights(mesh, b) ? withOtherEvidence : 1);
     }
   }
 }
@@ -157,7 +180,8 @@ Mended findMend(const MeshView& mesh, const PoseInput& input, const Skeleton& sk
     if (!undone) continue;
     diagnosis::BindSkeleton bind = skeleton.bind;
     if (hypothesis.undoBind) bind.inverseBind = *hypothesis.undoBind(bind.inverseBind);
-    mended.offer(hypothesis.mistake, hypothesis.message, wrong, probe.score(*undone, bind));
+    mended.offer(hypothesis.mistake, hypothesis.message, wrong, probe.score(*undone, bind),
+                 hypothesis.mistake == PoseMistake::transposed ? withOtherEvidence : 1);
   }
   offerWeightSets(mesh, input, skeleton, pose, wrong, mended);
   return mended;
@@ -245,7 +269,6 @@ Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
   const PoseScore score = probe.score(pose, skeleton->bind);
   result.stretch = result.mendedStretch = score.stretch;
   const std::vector<Hypothesis> hypotheses = diagnosis::hypothesesFor(*skeleton);
-  if (std::getenv("DBG")) std::fprintf(stderr, "SCORE %.4f %.4f %.4f %.4f %.4f\n", score.stretch, score.apart, score.loose, score.bend, score.misfit);
   bool consistent = false;
   if (skeleton->isComplete()) {
     const Pose right = rebuild(*skeleton, globalsOf(*skeleton, skeleton->locals));
@@ -264,6 +287,13 @@ Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
       findMend(mesh, input, *skeleton, probe, hypotheses, pose, score, consistent);
   if (mended.mistake == PoseMistake::unknown) {
     if (score.stretch <= tornStretch) return result;
+    // Without a skeleton the lost translations cannot be found again, but that they are lost shows.
+    const auto transposed = std::ranges::find(hypotheses, PoseMistake::transposed, &Hypothesis::mistake);
+    if (transposed->undo(pose)) {
+      result.mistake = transposed->mistake;
+      result.message = transposed->message;
+      return result;
+    }
     result.mistake = mended.mistake;
     result.message =
         "the pose tears the mesh, but none of the tested mistakes explains it: pass what "

@@ -83,10 +83,12 @@ std::optional<Pose> completed(std::vector<std::optional<Affine>> found, const Sk
     }
     if (found[from]) {
       pose[joint] = *found[from];
+      pose[joint].guessed = from != joint;
     } else {  // a root: moves with any child
       const auto any = std::ranges::find_if(found, [](const auto& a) { return a.has_value(); });
       if (any == found.end()) return std::nullopt;
       pose[joint] = **any;
+      pose[joint].guessed = true;
     }
   }
   return pose;
@@ -268,20 +270,27 @@ class Builder {
     bool same = true;
     for (std::uint32_t joint = 0; joint < from.size(); ++joint) same &= from[joint] == joint;
     if (same) return;
-    addBoth(
-        mistake, message,
-        [from](const Pose& pose) {
-          Pose result(pose.size());
-          for (std::size_t joint = 0; joint < pose.size(); ++joint)
-            if (from[joint] != noJoint) result[joint] = pose[from[joint]];
-          return std::optional(std::move(result));
-        },
-        [from, &skeleton = skeleton_](const Pose& pose) {
-          std::vector<std::optional<Affine>> found(pose.size());
-          for (std::size_t joint = pose.size(); joint-- > 0;)
-            if (from[joint] != noJoint) found[from[joint]] = pose[joint];
-          return completed(std::move(found), skeleton);
-        });
+    const Change make = [from](const Pose& pose) {
+      Pose result(pose.size());
+      for (std::size_t joint = 0; joint < pose.size(); ++joint)
+        if (from[joint] != noJoint) result[joint] = pose[from[joint]];
+      return std::optional(std::move(result));
+    };
+    for (const bool ofGlobal : {true, false}) {
+      if (ofGlobal && !hasBind()) continue;
+      const auto undo = [from, ofGlobal, &skeleton = skeleton_](const Pose& pose) {
+        const Pose& bind = skeleton.bind.inverseBind;
+        std::vector<std::optional<Affine>> found(pose.size());
+        for (std::size_t joint = pose.size(); joint-- > 0;) {
+          const std::uint32_t right = from[joint];
+          if (right == noJoint) continue;
+          found[right] =
+              ofGlobal ? pose[joint] * inverse(bind[joint]) * bind[right] : pose[joint];
+        }
+        return completed(std::move(found), skeleton);
+      };
+      add(mistake, message, ofGlobal ? ofGlobals(make) : make, undo);
+    }
   }
 
   void addOrders() {

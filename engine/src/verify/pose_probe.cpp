@@ -20,7 +20,7 @@ using glm::dmat3;
 using glm::dvec3;
 
 constexpr std::size_t maxReadEdges = 20'000;
-constexpr std::size_t maxEdges = 1'500;
+constexpr std::size_t maxEdges = 800;
 /// Edges count as at least so long, in mesh sizes: the stretch of tiny ones is not seen.
 constexpr double shortestEdge = 0.01;
 /// A joint is loose if it is further from where its parent takes it, in lengths of its bone.
@@ -102,12 +102,13 @@ void thin(std::vector<T>& values, std::size_t limit) {
 }  // namespace
 
 Affine operator*(const Affine& a, const Affine& b) {
-  return {a.linear * b.linear, a.linear * b.translation + a.translation};
+  return {a.linear * b.linear, a.linear * b.translation + a.translation,
+          a.guessed || b.guessed};
 }
 
 Affine inverse(const Affine& a) {
   const dmat3 linear = glm::inverse(a.linear);
-  return {linear, -(linear * a.translation)};
+  return {linear, -(linear * a.translation), a.guessed};
 }
 
 Affine toAffine(const JointMatrix& matrix) {
@@ -251,6 +252,12 @@ void PoseProbe::addJoints(const Pose& pose, const BindSkeleton& skeleton, PoseSc
     const std::uint32_t parent = skeleton.parents[joint];
     if (parent == noJoint || !isFinite(pose[joint]) || !isFinite(pose[parent])) continue;
     ++pairs;
+    if (pose[joint].guessed || pose[parent].guessed) {  // no evidence for this pose
+      score.bend += 0.5;
+      score.apart += skeleton.inverseBind.empty() ? 0 : 1;
+      score.loose += skeleton.inverseBind.empty() ? 0 : 1;
+      continue;
+    }
     score.bend += angleBetween(pose[joint].linear, pose[parent].linear);
     if (skeleton.inverseBind.empty()) continue;
     const double scale = std::sqrt(squaredScale(pose[parent].linear));

@@ -16,6 +16,9 @@ namespace dermis::diagnosis {
 struct Affine {
   glm::dmat3 linear{1};
   glm::dvec3 translation{0};
+  /// The transform of a joint is not known: it moves with another one. A product with it is not
+  /// known, either.
+  bool guessed = false;
 };
 
 Affine operator*(const Affine& a, const Affine& b);
