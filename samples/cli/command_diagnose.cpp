@@ -45,7 +45,8 @@ Result<std::vector<float>> numbersIn(std::string_view line) {
     char* last = nullptr;
     numbers.push_back(std::strtof(word.c_str(), &last));
     if (last != word.c_str() + word.size())
-      return Error{ErrorCode::invalidData, fmt::format("{} is not a number", samples::inQuotes(word))};
+      return Error{ErrorCode::invalidData,
+                   fmt::format("{} is not a number", samples::inQuotes(word))};
     begin = end;
   }
   return numbers;
@@ -54,7 +55,8 @@ Result<std::vector<float>> numbersIn(std::string_view line) {
 /// Fails with `ioError` or `invalidData`.
 Result<std::vector<JointMatrix>> readPose(const std::string& name) {
   std::ifstream file(samples::pathOf(name));
-  if (!file) return Error{ErrorCode::ioError, fmt::format("{} cannot be read", samples::inQuotes(name))};
+  if (!file)
+    return Error{ErrorCode::ioError, fmt::format("{} cannot be read", samples::inQuotes(name))};
   std::vector<JointMatrix> pose;
   std::string line;
   for (std::size_t number = 1; std::getline(file, line); ++number) {
@@ -86,7 +88,8 @@ glm::dmat4 matrixOf(const gltf::GlobalTransform& rows) {
 }
 
 /// The transforms of all nodes relative to their parents.
-std::vector<JointMatrix> localTransforms(const gltf::Model& model, std::uint32_t clip, double time) {
+std::vector<JointMatrix> localTransforms(const gltf::Model& model, std::uint32_t clip,
+                                         double time) {
   const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(model, clip, time);
   std::vector<JointMatrix> locals;
   for (std::size_t node = 0; node < globals.size(); ++node) {
@@ -103,8 +106,8 @@ std::vector<JointMatrix> localTransforms(const gltf::Model& model, std::uint32_t
 
 /// What a model says of its skeletons.
 struct ModelSkeleton {
-  std::vector<std::uint32_t> parents;   ///< by node
-  std::vector<JointMatrix> locals;      ///< by node; empty if not known
+  std::vector<std::uint32_t> parents;  ///< by node
+  std::vector<JointMatrix> locals;     ///< by node; empty if not known
 };
 
 Result<Diagnosis> diagnosePart(const Scene& scene, const ScenePart& part,

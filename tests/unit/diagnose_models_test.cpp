@@ -124,7 +124,8 @@ struct PosedPart {
 Matrices globalsOf(const PosedPart& part, const Matrices& locals) {
   Matrices globals = locals;
   for (const std::uint32_t node : part.model->nodeOrder)
-    if (part.parents[node] != gltf::none) globals[node] = globals[part.parents[node]] * locals[node];
+    if (part.parents[node] != gltf::none)
+      globals[node] = globals[part.parents[node]] * locals[node];
   return globals;
 }
 
@@ -144,9 +145,8 @@ void pose(PosedPart& part, std::uint32_t clip, double time) {
   for (std::size_t node = 0; node < part.locals.size(); ++node) {
     if (part.parents[node] == gltf::none) continue;
     const dmat4& parent = part.globals[part.parents[node]];
-    part.locals[node] = glm::determinant(dmat3(parent)) != 0
-                            ? glm::inverse(parent) * part.globals[node]
-                            : dmat4(1);
+    part.locals[node] =
+        glm::determinant(dmat3(parent)) != 0 ? glm::inverse(parent) * part.globals[node] : dmat4(1);
   }
   part.right = poseOf(part, part.globals, part.inverseBind);
 }
@@ -202,9 +202,8 @@ class Mistakes {
   }
 
   void transposed() {
-    add(PoseMistake::transposed, "4x4", each(part_.right, [](const dmat4& m) {
-          return dmat4(glm::transpose(dmat3(m)));
-        }));
+    add(PoseMistake::transposed, "4x4",
+        each(part_.right, [](const dmat4& m) { return dmat4(glm::transpose(dmat3(m))); }));
     add(PoseMistake::columnMajor, "12 floats", each(part_.right, [](const dmat4& m) {
           std::array<double, 12> floats{};
           for (std::size_t i = 0; i < 12; ++i)
@@ -281,8 +280,8 @@ class Mistakes {
     }
   }
 
-  /// Local transforms that are changed by a loader: `diagnose` gets the wrong ones. By the code that
-  /// samples: it gets the right ones.
+  /// Local transforms that are changed by a loader: `diagnose` gets the wrong ones. By the code
+  /// that samples: it gets the right ones.
   void local(PoseMistake mistake, const std::string& form, const Matrices& locals) {
     const Matrices wrong = poseOf(part_, globalsOf(part_, locals), part_.inverseBind);
     add(mistake, form + ", on sampling", wrong);
@@ -301,7 +300,8 @@ class Mistakes {
       skeleton.locals = each(part_.locals, scaled);
       skeleton.inverseBind = each(part_.inverseBind, scaled);
       add(PoseMistake::units, name + " of the model", each(part_.right, [factor](const dmat4& m) {
-            return dmat4(factor * m[0], factor * m[1], factor * m[2], dvec4(dvec3(m[3]) * factor, 1));
+            return dmat4(factor * m[0], factor * m[1], factor * m[2],
+                         dvec4(dvec3(m[3]) * factor, 1));
           }));
     }
   }
@@ -421,8 +421,8 @@ struct Count {
 using Table = std::map<std::pair<PoseMistake, std::string>, Count>;
 
 void print(const Table& table) {
-  std::printf("%-40s %-50s %6s %6s %8s %6s %7s  others\n", "mistake", "form", "cases",
-              "small", "untested", "right", "%");
+  std::printf("%-40s %-50s %6s %6s %8s %6s %7s  others\n", "mistake", "form", "cases", "small",
+              "untested", "right", "%");
   for (const auto& [key, count] : table) {
     std::string others;
     for (const auto& [name, times] : count.others)
@@ -468,12 +468,11 @@ void countMistakes(const PosedPart& part, Known known, Table& table) {
       continue;
     }
     ++count.cases;
-    const bool named =
-        std::ranges::any_of(wrongs, [&](const Wrong& other) {
-          return other.mistake == diagnosis.mistake &&
-                 (other.mistake == wrong.mistake ||
-                  largestDistance(wrong.skinned, other.skinned) <= 1e-4 * sizeOf(wrong.skinned));
-        });
+    const bool named = std::ranges::any_of(wrongs, [&](const Wrong& other) {
+      return other.mistake == diagnosis.mistake &&
+             (other.mistake == wrong.mistake ||
+              largestDistance(wrong.skinned, other.skinned) <= 1e-4 * sizeOf(wrong.skinned));
+    });
     if (named) {
       ++count.right;
     } else {
@@ -510,8 +509,8 @@ PosedPart partOf(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
   return part;
 }
 
-/// Calls with the skinned parts of the models, in poses of all clips, or in the rest pose of a model
-/// without clips. Returns the number of models.
+/// Calls with the skinned parts of the models, in poses of all clips, or in the rest pose of a
+/// model without clips. Returns the number of models.
 int forEachPose(const std::filesystem::path& data, const Choice& choice,
                 const std::function<void(const PosedPart&, const std::string&)>& call) {
   std::vector<std::filesystem::path> files;
@@ -580,10 +579,9 @@ double namedRight(const char* title, Known known) {
   const auto data = testDataFolder();
   if (!data) return 1;
   Table table;
-  const int models =
-      forEachPose(*data, wrongChoice, [&](const PosedPart& part, const std::string&) {
-        countMistakes(part, known, table);
-      });
+  const int models = forEachPose(
+      *data, wrongChoice,
+      [&](const PosedPart& part, const std::string&) { countMistakes(part, known, table); });
   EXPECT_GE(models, 15 / static_cast<int>(wrongChoice.everyModel));
   std::printf("\n%s: %d models\n", title, models);
   print(table);

@@ -1,5 +1,5 @@
-// `diagnose` on a small rig: each mistake is named, and what is missing is listed. The models of the
-// test data are in diagnose_models_test.cpp.
+// `diagnose` on a small rig: each mistake is named, and what is missing is listed. The models of
+// the test data are in diagnose_models_test.cpp.
 #include <dermis/verify.h>
 #include <gtest/gtest.h>
 
@@ -31,14 +31,14 @@ constexpr std::uint32_t noParent = 0xffffffffu;
 class Rig {
  public:
   Rig() {
-    const std::array<vec3, 6> ends{vec3(0, 1, 0),      vec3(0, 0.8f, 0.1f), vec3(0.7f, 0.2f, 0.1f),
-                                   vec3(0.6f, 0, 0),   vec3(-0.5f, 0, 0.3f), vec3(0.1f, 0.5f, 0.2f)};
+    const std::array<vec3, 6> ends{vec3(0, 1, 0),    vec3(0, 0.8f, 0.1f),  vec3(0.7f, 0.2f, 0.1f),
+                                   vec3(0.6f, 0, 0), vec3(-0.5f, 0, 0.3f), vec3(0.1f, 0.5f, 0.2f)};
     const std::array<std::uint32_t, 6> above{0, 1, 2, 3, 2, 2};
     const std::array<vec3, 6> turns{vec3(0, 0.2f, 0),    vec3(0.4f, 0, 0),     vec3(0, 0, 0.9f),
                                     vec3(0, 0.7f, 0.3f), vec3(0.2f, 0, -0.8f), vec3(0.5f, 0.4f, 0)};
     parents = {noParent};
-    const mat4 root = glm::rotate(glm::translate(mat4(1), vec3(0.2f, 0, 3)), -1.5707963f,
-                                  vec3(1, 0, 0));
+    const mat4 root =
+        glm::rotate(glm::translate(mat4(1), vec3(0.2f, 0, 3)), -1.5707963f, vec3(1, 0, 0));
     bind_ = locals = {root};
     for (std::size_t i = 0; i < 6; ++i) {
       parents.push_back(above[i]);
@@ -50,8 +50,7 @@ class Rig {
     }
     for (const std::uint32_t node : jointNodes)
       inverseBind.push_back(glm::inverse(globals(bind_)[node]) * root);
-    for (std::size_t joint = 0; joint < 6; ++joint)
-      addBox(joint, ends[jointNodes[joint] - 1]);
+    for (std::size_t joint = 0; joint < 6; ++joint) addBox(joint, ends[jointNodes[joint] - 1]);
   }
 
   std::vector<mat4> globals(const std::vector<mat4>& of) const {
@@ -96,8 +95,8 @@ class Rig {
   /// A box around the bone of a joint, in four rings. The first ring moves with the parent, too.
   void addBox(std::size_t joint, const vec3& end) {
     const std::uint32_t above = parents[jointNodes[joint]];
-    const auto parent = static_cast<std::uint32_t>(std::ranges::find(jointNodes, above) -
-                                                   jointNodes.begin());
+    const auto parent =
+        static_cast<std::uint32_t>(std::ranges::find(jointNodes, above) - jointNodes.begin());
     const mat4 place = glm::inverse(inverseBind[joint]);
     const auto first = static_cast<std::uint32_t>(positions_.size());
     for (std::uint32_t ring = 0; ring < 4; ++ring) {
@@ -106,9 +105,9 @@ class Rig {
         positions_.emplace_back(place * glm::vec4(end * (static_cast<float>(ring) / 3) + side, 1));
         const bool both = ring == 0 && parent < 6;
         joints_[0].push_back({static_cast<std::uint32_t>(joint), both ? parent : 0});
-        joints_[1].push_back({0, 0});
-        weights_[0].push_back({both ? 0.5f : 1, both ? 0.5f : 0});
-        weights_[1].push_back({0, 0});
+        joints_[1].push_back({static_cast<std::uint32_t>(joint + 2) % 6, 0});
+        weights_[0].push_back({both ? 0.5f : 0.98f, both ? 0.48f : 0});
+        weights_[1].push_back({0.02f, 0});
         if (ring == 0) continue;
         const std::uint32_t here = first + ring * 4 + corner;
         const std::uint32_t next = first + ring * 4 + (corner ^ (ring % 2 + 1));
@@ -157,10 +156,11 @@ class DiagnoseTest : public ::testing::Test {
   }
 
   /// The mistake, found with the local transforms and without.
-  void expectNamed(PoseMistake mistake, const std::vector<JointMatrix>& pose,
-                   std::string_view line) {
+  void expectNamed(PoseMistake mistake, const std::vector<JointMatrix>& pose, std::string_view line,
+                   bool needsLocals = false) {
     PoseInput known = input(pose);
     for (const bool hasLocals : {true, false}) {
+      if (!hasLocals && needsLocals) continue;
       if (!hasLocals) known.localTransforms = {};
       const Diagnosis diagnosis = found(known);
       EXPECT_EQ(diagnosis.mistake, mistake) << poseMistakeName(diagnosis.mistake);
@@ -210,22 +210,26 @@ TEST_F(DiagnoseTest, AScaledModelIsSound) {
 }
 
 TEST_F(DiagnoseTest, NamesTransposedMatrices) {
-  expectNamed(PoseMistake::transposed, each(right_, [](const JointMatrix& m) {
-                JointMatrix wrong;
-                for (std::size_t row = 0; row < 3; ++row)
-                  for (std::size_t column = 0; column < 3; ++column)
-                    wrong.m[row][column] = m.m[column][row];
-                return wrong;
-              }),
+  expectNamed(PoseMistake::transposed,
+              each(right_,
+                   [](const JointMatrix& m) {
+                     JointMatrix wrong;
+                     for (std::size_t row = 0; row < 3; ++row)
+                       for (std::size_t column = 0; column < 3; ++column)
+                         wrong.m[row][column] = m.m[column][row];
+                     return wrong;
+                   }),
               "jointMatrices[j] = toJointMatrix(matrices[j])");
 }
 
 TEST_F(DiagnoseTest, NamesColumnMajorFloats) {
-  expectNamed(PoseMistake::columnMajor, each(right_, [](const JointMatrix& m) {
-                JointMatrix wrong;
-                for (std::size_t i = 0; i < 12; ++i) wrong.m[i / 4][i % 4] = m.m[i % 3][i / 3];
-                return wrong;
-              }),
+  expectNamed(PoseMistake::columnMajor,
+              each(right_,
+                   [](const JointMatrix& m) {
+                     JointMatrix wrong;
+                     for (std::size_t i = 0; i < 12; ++i) wrong.m[i / 4][i % 4] = m.m[i % 3][i / 3];
+                     return wrong;
+                   }),
               "jointMatrices[j].m[row][column] = columns[column][row]");
 }
 
@@ -248,7 +252,9 @@ TEST_F(DiagnoseTest, NamesInverseBindMatrices) {
 TEST_F(DiagnoseTest, NamesOrdersOfJoints) {
   expectNamed(PoseMistake::jointsInNodeOrder, ordered({1, 0, 3, 5, 4, 2}), "skin.joints[j]");
   expectNamed(PoseMistake::jointsSortedByName, ordered({0, 5, 2, 1, 4, 3}), "jointNames[j]");
-  expectNamed(PoseMistake::jointsOffByOne, ordered({1, 2, 3, 4, 5, 5}), "jointMatrices[j - 1]");
+  // The chest is lost, to which most bones are attached.
+  expectNamed(PoseMistake::jointsOffByOne, ordered({1, 2, 3, 4, 5, 5}), "jointMatrices[j - 1]",
+              true);
   expectNamed(PoseMistake::jointsOffByOne, ordered({0, 0, 1, 2, 3, 4}), "jointMatrices[j + 1]");
 }
 
@@ -285,9 +291,9 @@ TEST_F(DiagnoseTest, NamesUnitsAxesAndQuaternions) {
   expectNamed(PoseMistake::units, rows(rig_.pose(large)), "translation *= 0.01f");
   expectNamed(PoseMistake::axes, rows(rig_.pose(mirrored)), "mirrorZ");
   expectNamed(PoseMistake::quaternionOrder, rows(rig_.pose(turned)), "{x, y, z, w}");
-  for (const auto& [mistake, locals] : {std::pair(PoseMistake::units, large),
-                                        std::pair(PoseMistake::axes, mirrored),
-                                        std::pair(PoseMistake::quaternionOrder, turned)}) {
+  for (const auto& [mistake, locals] :
+       {std::pair(PoseMistake::units, large), std::pair(PoseMistake::axes, mirrored),
+        std::pair(PoseMistake::quaternionOrder, turned)}) {
     locals_ = rows(locals);
     const std::vector<JointMatrix> pose = rows(rig_.pose(locals));
     EXPECT_EQ(found(input(pose)).mistake, mistake) << poseMistakeName(mistake);

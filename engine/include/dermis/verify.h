@@ -179,16 +179,16 @@ DERMIS_VERIFY_API Result<Comparison> compareWithReference(const reference::Skinn
                                                           const SkinnedView& actual,
                                                           const Exemptions& exemptions = {});
 
-// ---- Finds out whether a pose is plausible for a mesh, and which mistake makes it wrong. For debug
-// builds: an engine calls it once, with the first pose of an instance.
+// ---- Finds out whether a pose is plausible for a mesh, and which mistake makes it wrong. For
+// debug builds: an engine calls it once, with the first pose of an instance.
 
 /// Well-known mistakes of engines that compute joint matrices. J is the right joint matrix, G the
 /// joint's global transform, B its inverse bind matrix: J = G · B.
 enum class PoseMistake : std::uint8_t {
   none = 0,
-  unknown = 1,     ///< the pose is wrong, but none of the tested mistakes explains it
-  transposed = 2,  ///< 4×4 matrices are read in the wrong order, so that the translation is lost
-  columnMajor = 3,           ///< 12 floats in column-major order are read as row-major
+  unknown = 1,      ///< the pose is wrong, but none of the tested mistakes explains it
+  transposed = 2,   ///< 4×4 matrices are read in the wrong order, so that the translation is lost
+  columnMajor = 3,  ///< 12 floats in column-major order are read as row-major
   inverseBindMissing = 4,    ///< G instead of G · B
   inverseBindTwice = 5,      ///< G · B · B
   inverseBindWrongSide = 6,  ///< B · G
@@ -197,14 +197,15 @@ enum class PoseMistake : std::uint8_t {
   jointsOffByOne = 9,        ///< the matrix of the joint before or after
   rootMissing = 10,          ///< without the transform of the nodes above the skeleton, or the root
   rootTwice = 11,            ///< with it twice
-  units = 12,                ///< lengths of the skeleton are 100 times or 0.01 times those of the mesh
-  axes = 13,                 ///< the skeleton has another handedness or up axis than the mesh
-  quaternionOrder = 14,      ///< w, x, y, z read as x, y, z, w, or the other way around
-  weightSet = 15,            ///< weights of one influence set are read for another
+  units = 12,            ///< lengths of the skeleton are 100 times or 0.01 times those of the mesh
+  axes = 13,             ///< the skeleton has another handedness or up axis than the mesh
+  quaternionOrder = 14,  ///< w, x, y, z read as x, y, z, w, or the other way around
+  weightSet = 15,        ///< weights of one influence set are read for another
 };
 
-/// A pose, and what is known of its skeleton. Only `jointMatrices` is required. What is not known is
-/// left empty; mistakes that need it are then not tested. "Joint" is an index into `jointMatrices`.
+/// A pose, and what is known of its skeleton. Only `jointMatrices` is required. What is not known
+/// is left empty; mistakes that need it are then not tested. "Joint" is an index into
+/// `jointMatrices`.
 struct PoseInput {
   std::span<const JointMatrix> jointMatrices;  ///< those that the mesh is skinned with
   /// 3 vertex indices per triangle. Without them, vertices that are near each other count as
@@ -215,8 +216,8 @@ struct PoseInput {
   /// The node of each joint: an index into `parents` and `localTransforms`. If empty, joint j is
   /// node j, and there may be further nodes.
   std::span<const std::uint32_t> jointNodes;
-  /// The parent of each node. A root has one that does not exist, such as 0xffffffff. Pass the nodes
-  /// above the skeleton, too: they have the root transform.
+  /// The parent of each node. A root has one that does not exist, such as 0xffffffff. Pass the
+  /// nodes above the skeleton, too: they have the root transform.
   std::span<const std::uint32_t> parents;
   /// The transform of each node relative to its parent, from which the engine computed
   /// `jointMatrices`. Most mistakes are certain only with them.
@@ -248,7 +249,8 @@ DERMIS_VERIFY_API const char* poseMistakeName(PoseMistake mistake);
 ///
 /// - If the skeleton is known with its local transforms, the right joint matrices are computed from
 ///   it. If those of the input differ, the mistake that makes them equal is named.
-/// - Otherwise, and if the local transforms may be wrong themselves, each mistake is undone, and the
+/// - Otherwise, and if the local transforms may be wrong themselves, each mistake is undone, and
+/// the
 ///   result is measured: how edges are stretched, how far joints are from where their parents take
 ///   them, and how far the pose is from the bind pose.
 /// - Mistakes that move the whole model (root transform, its scale) are found only by the first.
@@ -256,9 +258,9 @@ DERMIS_VERIFY_API const char* poseMistakeName(PoseMistake mistake);
 ///   milliseconds for each mesh.
 ///
 /// Fails with `invalidMesh` if `pack` refuses the mesh for this number of joints, and with
-/// `invalidArgument` if there are no joint matrices, if a span does not have the size that is stated
-/// above, if a triangle names a vertex or a joint a node that does not exist, or if the parents form
-/// a cycle.
+/// `invalidArgument` if there are no joint matrices, if a span does not have the size that is
+/// stated above, if a triangle names a vertex or a joint a node that does not exist, or if the
+/// parents form a cycle.
 DERMIS_VERIFY_API Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input);
 
 }  // namespace dermis

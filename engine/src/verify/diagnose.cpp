@@ -29,9 +29,9 @@ using diagnosis::Skeleton;
 /// Poses are equal if no vertex differs by more, in sizes of the posed mesh.
 constexpr double sameVertex = 0.01;
 /// A measure of a pose. Above `suspicious` it is suspicious. Sound poses may be, too: a rig may
-/// stretch, and its joints may move apart. They have no finding, because no mistake explains them. A
-/// mistake does if undoing it leaves at most `explained` of the measure.
-/// The numbers are from the sound poses of tests/unit/diagnose_models_test.cpp.
+/// stretch, and its joints may move apart. They have no finding, because no mistake explains them.
+/// A mistake does if undoing it leaves at most `explained` of the measure. The numbers are from the
+/// sound poses of tests/unit/diagnose_models_test.cpp.
 struct Measure {
   double PoseScore::*value;
   double suspicious;
@@ -115,8 +115,8 @@ struct Mended {
   double cost = std::numeric_limits<double>::infinity();
 
   /// `doubt` is smaller if there is other evidence for the mistake.
-  void offer(PoseMistake by, const std::string& text, const PoseScore& wrong,
-             const PoseScore& with, double doubt = 1) {
+  void offer(PoseMistake by, const std::string& text, const PoseScore& wrong, const PoseScore& with,
+             double doubt = 1) {
     const double newCost = doubt * costOf(with);
     if (!explains(wrong, with) || !(newCost < cost - 1e-4)) return;
     cost = newCost;
@@ -151,6 +151,7 @@ void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleto
   const std::size_t count = mesh.influenceSets.size();
   for (std::size_t a = 0; a < count; ++a) {
     for (std::size_t b = a + 1; b < count; ++b) {
+      if (!(sumOfWeights(mesh, a) < sumOfWeights(mesh, b))) continue;
       std::vector<std::size_t> order(count);
       for (std::size_t i = 0; i < count; ++i) order[i] = i == a ? b : i == b ? a : i;
       const std::vector<InfluenceSet> sets = reorderedSets(mesh, order);
@@ -164,8 +165,7 @@ void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleto
                        ": use influenceSets[" + std::to_string(a) + "].weights = WEIGHTS_" +
                        std::to_string(a) + " and influenceSets[" + std::to_string(b) +
                        "].weights = WEIGHTS_" + std::to_string(b),
-                   wrong, probe.score(pose, skeleton.bind),
-                   sumOfWeights(mesh, a) < sumOfWeights(mesh, b) ? withOtherEvidence : 1);
+                   wrong, probe.score(pose, skeleton.bind), withOtherEvidence);
     }
   }
 }
@@ -193,8 +193,7 @@ Result<void> checkInput(const MeshView& mesh, const PoseInput& input) {
     return Error{ErrorCode::invalidArgument,
                  "PoseInput::jointMatrices has " + std::to_string(count) + " elements"};
   }
-  if (const Result<void> accepted =
-          validate(mesh, static_cast<std::uint32_t>(count)).accepted();
+  if (const Result<void> accepted = validate(mesh, static_cast<std::uint32_t>(count)).accepted();
       !accepted) {
     return accepted;
   }
@@ -273,8 +272,7 @@ Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
   if (skeleton->isComplete()) {
     const Pose right = rebuild(*skeleton, globalsOf(*skeleton, skeleton->locals));
     consistent = differenceOf(probe, probe.skin(pose), right) <= sameVertex;
-    const Hypothesis* maker =
-        consistent ? nullptr : findMaker(probe, hypotheses, right, pose);
+    const Hypothesis* maker = consistent ? nullptr : findMaker(probe, hypotheses, right, pose);
     if (maker != nullptr) {
       result.mistake = maker->mistake;
       result.message = maker->message;
@@ -288,7 +286,8 @@ Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
   if (mended.mistake == PoseMistake::unknown) {
     if (score.stretch <= tornStretch) return result;
     // Without a skeleton the lost translations cannot be found again, but that they are lost shows.
-    const auto transposed = std::ranges::find(hypotheses, PoseMistake::transposed, &Hypothesis::mistake);
+    const auto transposed =
+        std::ranges::find(hypotheses, PoseMistake::transposed, &Hypothesis::mistake);
     if (transposed->undo(pose)) {
       result.mistake = transposed->mistake;
       result.message = transposed->message;

@@ -121,8 +121,8 @@ std::optional<Pose> transposedBack(const Skeleton& skeleton, const Pose& pose) {
       const std::uint32_t parent = skeleton.bind.parents[joint];
       if (skeleton.nodeOfJoint[joint] != node || parent == noJoint) continue;
       const dvec3 place = inverse(skeleton.bind.inverseBind[joint]).translation;
-      result[joint].translation = result[parent].linear * place + result[parent].translation -
-                                  result[joint].linear * place;
+      result[joint].translation =
+          result[parent].linear * place + result[parent].translation - result[joint].linear * place;
     }
   }
   return result;
@@ -130,7 +130,8 @@ std::optional<Pose> transposedBack(const Skeleton& skeleton, const Pose& pose) {
 
 /// With other rotations of all nodes. If local transforms are not known, they are computed from
 /// the pose.
-std::optional<Pose> withOrder(const Skeleton& skeleton, const Pose& pose, const std::array<int, 4>& order) {
+std::optional<Pose> withOrder(const Skeleton& skeleton, const Pose& pose,
+                              const std::array<int, 4>& order) {
   const Pose& bind = skeleton.bind.inverseBind;
   if (skeleton.hasLocals()) {
     Pose locals;
@@ -212,7 +213,9 @@ class Builder {
     add(PoseMistake::transposed,
         "the joint matrices are transposed, which loses their translations: use "
         "jointMatrices[j] = toJointMatrix(matrices[j]), which reads column-major 4x4 matrices",
-        each([](const Affine& a) { return Affine{glm::transpose(a.linear), dvec3(0)}; }),
+        each([](const Affine& a) {
+          return Affine{glm::transpose(a.linear), dvec3(0)};
+        }),
         [&skeleton = skeleton_](const Pose& pose) { return transposedBack(skeleton, pose); });
     const auto readWrongly = [](const Affine& a, bool make) {
       // As 12 floats: 4 columns of 3, or 3 rows of 4.
@@ -242,17 +245,20 @@ class Builder {
   void addInverseBind() {
     const Pose& bind = skeleton_.bind.inverseBind;
     const Pose unbind = inverses(bind);
-    add(PoseMistake::inverseBindMissing,
+    add(
+        PoseMistake::inverseBindMissing,
         "the inverse bind matrices are missing: use "
         "jointMatrices[j] = globalTransforms[j] * inverseBindMatrices[j]",
         [unbind](const Pose& pose) { return std::optional(times(pose, unbind)); },
         [&bind](const Pose& pose) { return std::optional(times(pose, bind)); });
-    add(PoseMistake::inverseBindTwice,
+    add(
+        PoseMistake::inverseBindTwice,
         "the inverse bind matrices are multiplied twice: use "
         "jointMatrices[j] = globalTransforms[j] * inverseBindMatrices[j], once",
         [&bind](const Pose& pose) { return std::optional(times(pose, bind)); },
         [unbind](const Pose& pose) { return std::optional(times(pose, unbind)); });
-    add(PoseMistake::inverseBindWrongSide,
+    add(
+        PoseMistake::inverseBindWrongSide,
         "the inverse bind matrices are on the wrong side: use "
         "jointMatrices[j] = globalTransforms[j] * inverseBindMatrices[j], not "
         "inverseBindMatrices[j] * globalTransforms[j]",
@@ -284,8 +290,7 @@ class Builder {
         for (std::size_t joint = pose.size(); joint-- > 0;) {
           const std::uint32_t right = from[joint];
           if (right == noJoint) continue;
-          found[right] =
-              ofGlobal ? pose[joint] * inverse(bind[joint]) * bind[right] : pose[joint];
+          found[right] = ofGlobal ? pose[joint] * inverse(bind[joint]) * bind[right] : pose[joint];
         }
         return completed(std::move(found), skeleton);
       };
@@ -446,12 +451,14 @@ class Builder {
 
   void addQuaternions() {
     const std::array<int, 4> wFirst{3, 0, 1, 2}, wLast{1, 2, 3, 0};
-    add(PoseMistake::quaternionOrder,
+    add(
+        PoseMistake::quaternionOrder,
         "quaternions are read in the wrong order: use rotation = {x, y, z, w} with w last in "
         "memory, as in glTF; they are read as if w were last but have it first",
         [=, &skeleton = skeleton_](const Pose& pose) { return withOrder(skeleton, pose, wFirst); },
         [=, &skeleton = skeleton_](const Pose& pose) { return withOrder(skeleton, pose, wLast); });
-    add(PoseMistake::quaternionOrder,
+    add(
+        PoseMistake::quaternionOrder,
         "quaternions are read in the wrong order: use rotation = {w, x, y, z} with w first in "
         "memory; they are read as if w were first but have it last, as in glTF",
         [=, &skeleton = skeleton_](const Pose& pose) { return withOrder(skeleton, pose, wLast); },
@@ -513,8 +520,7 @@ Result<Skeleton> skeletonOf(const PoseInput& input) {
     while (above != noJoint && jointOfNode[above] == noJoint) above = skeleton.nodeParents[above];
     skeleton.bind.parents.push_back(above == noJoint ? noJoint : jointOfNode[above]);
   }
-  for (const JointMatrix& local : input.localTransforms)
-    skeleton.locals.push_back(toAffine(local));
+  for (const JointMatrix& local : input.localTransforms) skeleton.locals.push_back(toAffine(local));
   return skeleton;
 }
 
@@ -550,10 +556,8 @@ std::vector<std::pair<PoseMistake, std::string>> untested(const PoseInput& input
            PoseMistake::inverseBindWrongSide},
           "PoseInput::inverseBindMatrices");
   }
-  if (input.jointNodes.empty())
-    needs({PoseMistake::jointsInNodeOrder}, "PoseInput::jointNodes");
-  if (input.jointNames.empty())
-    needs({PoseMistake::jointsSortedByName}, "PoseInput::jointNames");
+  if (input.jointNodes.empty()) needs({PoseMistake::jointsInNodeOrder}, "PoseInput::jointNodes");
+  if (input.jointNames.empty()) needs({PoseMistake::jointsSortedByName}, "PoseInput::jointNames");
   if (input.inverseBindMatrices.empty() || input.localTransforms.empty()) {
     needs({PoseMistake::rootMissing, PoseMistake::rootTwice},
           "PoseInput::parents, localTransforms and inverseBindMatrices");

@@ -102,8 +102,7 @@ void thin(std::vector<T>& values, std::size_t limit) {
 }  // namespace
 
 Affine operator*(const Affine& a, const Affine& b) {
-  return {a.linear * b.linear, a.linear * b.translation + a.translation,
-          a.guessed || b.guessed};
+  return {a.linear * b.linear, a.linear * b.translation + a.translation, a.guessed || b.guessed};
 }
 
 Affine inverse(const Affine& a) {
@@ -221,8 +220,8 @@ void PoseProbe::findCenters(const MeshView& mesh) {
     reference::readInfluences(mesh, vertex, influences);
     const dvec3 position = reference::readPosition(mesh, vertex);
     for (const reference::Influence& influence : influences) {
-      Moved& joint = moved.try_emplace(influence.joint, Moved{influence.joint, 0, dvec3(0)})
-                         .first->second;
+      Moved& joint =
+          moved.try_emplace(influence.joint, Moved{influence.joint, 0, dvec3(0)}).first->second;
       joint.weight += influence.weight;
       joint.center += influence.weight * position;
     }
@@ -247,17 +246,15 @@ double PoseProbe::stretchOf(const Pose& pose, double scale) const {
 }
 
 void PoseProbe::addJoints(const Pose& pose, const BindSkeleton& skeleton, PoseScore& score) const {
-  std::size_t pairs = 0;
+  std::size_t pairs = 0, guessed = 0;
   for (std::size_t joint = 0; joint < skeleton.parents.size(); ++joint) {
     const std::uint32_t parent = skeleton.parents[joint];
     if (parent == noJoint || !isFinite(pose[joint]) || !isFinite(pose[parent])) continue;
-    ++pairs;
-    if (pose[joint].guessed || pose[parent].guessed) {  // no evidence for this pose
-      score.bend += 0.5;
-      score.apart += skeleton.inverseBind.empty() ? 0 : 1;
-      score.loose += skeleton.inverseBind.empty() ? 0 : 1;
+    if (pose[joint].guessed || pose[parent].guessed) {
+      ++guessed;
       continue;
     }
+    ++pairs;
     score.bend += angleBetween(pose[joint].linear, pose[parent].linear);
     if (skeleton.inverseBind.empty()) continue;
     const double scale = std::sqrt(squaredScale(pose[parent].linear));
@@ -269,6 +266,13 @@ void PoseProbe::addJoints(const Pose& pose, const BindSkeleton& skeleton, PoseSc
     const double moved = glm::distance(there, expected) / (scale * bone);
     score.apart += moved < 1 ? moved : 1;
     score.loose += moved < looseJoint ? 0 : 1;
+  }
+  // Too few joints are known: that is no evidence for the pose.
+  if (2 * guessed > pairs) {
+    score.bend += 0.5 * static_cast<double>(guessed);
+    score.apart += static_cast<double>(guessed);
+    score.loose += static_cast<double>(guessed);
+    pairs += guessed;
   }
   if (pairs == 0) return;
   score.bend /= static_cast<double>(pairs);
@@ -287,8 +291,7 @@ double PoseProbe::misfitOf(const BindSkeleton& skeleton) const {
   middle /= weight;
   double away = 0, spread = 0;
   for (const Moved& joint : moved_) {
-    const dvec3 off =
-        inverse(skeleton.inverseBind[joint.joint]).translation - joint.center;
+    const dvec3 off = inverse(skeleton.inverseBind[joint.joint]).translation - joint.center;
     const dvec3 out = joint.center - middle;
     away += joint.weight * glm::dot(off, off);
     spread += joint.weight * glm::dot(out, out);
