@@ -19,6 +19,7 @@
 #include "dermis/gltf.h"
 #include "dermis/mesh.h"
 #include "dermis/scene.h"
+#include "dermis/verify.h"
 #include "dermis/vulkan/drawing.h"
 #include "test_paths.h"
 
@@ -151,6 +152,36 @@ TEST(DocumentedExampleTest, ACharacterIsLoadedFromAFile) {
   const Result<Character> none = loadCharacter(models / "none.glb", 0, 0);
   ASSERT_FALSE(none.ok());
   EXPECT_EQ(none.error().code, ErrorCode::ioError);
+}
+
+TEST(DocumentedExampleTest, AWrongPoseIsDiagnosed) {
+  logged.clear();
+  const gltf::Model model = must(gltf::load(std::filesystem::path(test::sampleModels) / "bar.glb"));
+  const gltf::SkinnedPrimitive& part = model.skinnedPrimitives.at(0);
+  const gltf::Skin& skin = model.skins[part.skin];
+  const gltf::PrimitiveView view(model.meshes[part.mesh].primitives[part.primitive]);
+  const MeshView mesh = view.mesh();
+  const std::span<const std::uint32_t> triangles =
+      model.meshes[part.mesh].primitives[part.primitive].triangles.values();
+  const std::vector<JointMatrix> right = gltf::pose(model, part.skin, 0, 0.5);
+  std::vector<JointMatrix> jointMatrices = right;
+  for (std::size_t joint = 0; joint < right.size(); ++joint)
+    for (std::size_t i = 0; i < 12; ++i)
+      jointMatrices[joint].m[i / 4][i % 4] = right[joint].m[i % 3][i / 3];
+  std::vector<std::uint32_t> parents;
+  for (const gltf::Node& node : model.nodes) parents.push_back(node.parent);
+  const std::vector<JointMatrix> localTransforms;
+
+  // [diagnose]
+  PoseInput known{.jointMatrices = jointMatrices, .triangles = triangles};
+  known.inverseBindMatrices = skin.inverseBindMatrices, known.jointNodes = skin.joints;
+  known.parents = parents, known.localTransforms = localTransforms;  // of all nodes
+  const Diagnosis diagnosis = must(diagnose(mesh, known));
+  if (!diagnosis.plausible()) logWarning(diagnosis.message);
+  // [/diagnose]
+
+  ASSERT_EQ(logged.size(), 1u);
+  EXPECT_EQ(diagnosis.mistake, PoseMistake::columnMajor) << logged[0];
 }
 
 /// One thread for each job.

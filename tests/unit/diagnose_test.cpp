@@ -336,8 +336,9 @@ TEST_F(DiagnoseTest, ListsWhatIsNotTested) {
 
 TEST_F(DiagnoseTest, NamesNoMistakeForOthers) {
   std::vector<JointMatrix> pose = right_;
-  for (std::size_t joint = 0; joint < pose.size(); ++joint)
-    pose[joint].m[joint % 3][3] += joint % 2 == 0 ? 7.0f : -3.0f;
+  for (std::size_t joint = 0; joint < pose.size(); ++joint) {
+    for (float& value : pose[joint].m[joint % 3]) value *= joint % 2 == 0 ? 9.0f : -0.2f;
+  }
   const Diagnosis diagnosis = found(input(pose));
   EXPECT_EQ(diagnosis.mistake, PoseMistake::unknown);
   EXPECT_GT(diagnosis.stretch, 0.5);
