@@ -324,8 +324,11 @@ TEST_F(DiagnoseTest, ListsWhatIsNotTested) {
                 "inverse bind matrix missing: pass PoseInput::inverseBindMatrices",
                 "inverse bind matrix twice: pass PoseInput::inverseBindMatrices",
                 "inverse bind matrix on the wrong side: pass PoseInput::inverseBindMatrices",
-                "joints in the order of nodes: pass PoseInput::jointNodes",
-                "joints sorted by name: pass PoseInput::jointNames",
+                "joints in the order of nodes: pass PoseInput::jointNodes, parents and "
+                "inverseBindMatrices",
+                "joints sorted by name: pass PoseInput::jointNames, parents and "
+                "inverseBindMatrices",
+                "joints off by one: pass PoseInput::parents and inverseBindMatrices",
                 "root transform missing: pass PoseInput::parents, localTransforms and "
                 "inverseBindMatrices",
                 "root transform twice: pass PoseInput::parents, localTransforms and "
