@@ -207,21 +207,21 @@ enum class PoseMistake : std::uint8_t {
 /// is left empty; mistakes that need it are then not tested. "Joint" is an index into
 /// `jointMatrices`.
 struct PoseInput {
-  std::span<const JointMatrix> jointMatrices;  ///< those that the mesh is skinned with
+  std::span<const JointMatrix> jointMatrices = {};  ///< those that the mesh is skinned with
   /// 3 vertex indices per triangle. Without them, vertices that are near each other count as
   /// connected.
-  std::span<const std::uint32_t> triangles;
-  std::span<const JointMatrix> inverseBindMatrices;  ///< one for each joint
-  std::span<const std::string_view> jointNames;      ///< one for each joint
+  std::span<const std::uint32_t> triangles = {};
+  std::span<const JointMatrix> inverseBindMatrices = {};  ///< one for each joint
+  std::span<const std::string_view> jointNames = {};      ///< one for each joint
   /// The node of each joint: an index into `parents` and `localTransforms`. If empty, joint j is
   /// node j, and there may be further nodes.
-  std::span<const std::uint32_t> jointNodes;
+  std::span<const std::uint32_t> jointNodes = {};
   /// The parent of each node. A root has one that does not exist, such as 0xffffffff. Pass the
   /// nodes above the skeleton, too: they have the root transform.
-  std::span<const std::uint32_t> parents;
+  std::span<const std::uint32_t> parents = {};
   /// The transform of each node relative to its parent, from which the engine computed
   /// `jointMatrices`. Most mistakes are certain only with them.
-  std::span<const JointMatrix> localTransforms;
+  std::span<const JointMatrix> localTransforms = {};
 };
 
 /// What `diagnose` found.
