@@ -234,8 +234,8 @@ struct Diagnosis {
   double stretch = 0;
   /// The same after the mistake is mended.
   double mendedStretch = 0;
-  /// Mistakes that were not tested, and what to pass: "root transform missing: pass
-  /// PoseInput::parents and localTransforms".
+  /// Mistakes that were not tested, and what to pass: "joints off by one: pass PoseInput::parents
+  /// and inverseBindMatrices".
   std::vector<std::pair<PoseMistake, std::string>> notTested;
 
   /// Whether nothing was found.
