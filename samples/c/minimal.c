@@ -86,7 +86,7 @@ int main(void) {
   make_engine();
 
   // -- Dermis: while loading.
-  // [load]
+  // [mesh]
   const dermis_influence_set influences = {{joints, 0, DERMIS_UINT8, 2},
                                            {weights, 0, DERMIS_FLOAT32, 2}};
   const dermis_mesh_view mesh = {.size = sizeof mesh,
@@ -97,6 +97,8 @@ int main(void) {
                                  .influence_set_count = 1};
   dermis_packed* packed = NULL;
   must(dermis_pack(&mesh, 2, &packed, &error));
+  // [/mesh]
+  // [load]
   const dermis_device_desc device_desc = {.size = sizeof device_desc,
                                           .api_version = VK_API_VERSION_1_1,
                                           .instance = vk_instance,
@@ -139,12 +141,12 @@ int main(void) {
     must(dermis_record_barrier(context, cmd, DERMIS_USE_COPY_READ, DERMIS_USE_DERMIS, &error));
     must(dermis_record(recorder, cmd, VK_NULL_HANDLE, 0, &error));
     must(dermis_record_barrier(context, cmd, DERMIS_USE_DERMIS, DERMIS_USE_COPY_READ, &error));
-    // [/frame]
-    // An engine draws here. This program copies the vertices to compare them.
     dermis_instance_info place = {.size = sizeof place};
     dermis_recorder_info output = {.size = sizeof output};
     must(dermis_instance_contents(scene, instance, &place, &error));
     must(dermis_recorder_contents(recorder, &output, &error));
+    // [/frame]
+    // An engine draws from place.offset of output.output_buffer. This program copies and compares.
     const VkBufferCopy copy = {place.offset, 0, VERTEX_COUNT * STRIDE};
     vkCmdCopyBuffer(cmd, output.output_buffer, read_back, 1, &copy);
     must(dermis_record_barrier(context, cmd, DERMIS_USE_COPY_WRITE, DERMIS_USE_HOST_READ, &error));
@@ -155,7 +157,6 @@ int main(void) {
   }
 
   // -- The check: every vertex is compared with the reference in double precision.
-  // [compare]
   const dermis_posed_mesh posed = {sizeof posed, 2, &mesh, pose, NULL, 0, DERMIS_METHOD_DEFAULT};
   const dermis_skinned_view skinned = {.size = sizeof skinned,
                                        .vertex_count = VERTEX_COUNT,
@@ -163,7 +164,6 @@ int main(void) {
                                        .normals = {vertices + 3, STRIDE, DERMIS_FORMAT_FLOAT32X3}};
   dermis_comparison comparison = {.size = sizeof comparison};
   must(dermis_compare(&posed, &skinned, &comparison, &error));
-  // [/compare]
   printf("%d vertices: %s, worst position error %.0f %% of its bound\n", VERTEX_COUNT,
          comparison.passed ? "every vertex is right" : "WRONG", 100 * comparison.worst_position);
   return comparison.passed ? 0 : 1;  // the operating system takes the device back

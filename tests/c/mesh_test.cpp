@@ -255,6 +255,19 @@ TEST(CMeshTest, PointersSizesAndEnumsAreChecked) {
   EXPECT_EQ(info.added, 5u);
 }
 
+// Messages name functions and members of C. Names of the caller stay.
+TEST(CMeshTest, MessagesSpeakOfC) {
+  CMesh source(10);
+  source.mesh.weights[0] = -1;
+  source.view.name = "beginFrame";
+  Owned<dermis_packed> packed;
+  expectError(dermis_pack(&source.view, 8, &packed, &error), "mesh 'beginFrame'",
+              DERMIS_INVALID_MESH);
+  dermis_pack(&source.view, 8, &packed, &error);
+  EXPECT_NE(std::string(error.message).find("dermis_repair"), std::string::npos) << error.message;
+  EXPECT_EQ(std::string(error.message).find("repair()"), std::string::npos) << error.message;
+}
+
 TEST(CMeshTest, ALongMessageIsCutBetweenCharacters) {
   for (std::size_t shift = 0; shift < 3; ++shift) {
     std::string path(shift, 'x');
@@ -326,6 +339,81 @@ TEST(CMeshTest, TheReferenceIsThatOfCpp) {
   EXPECT_EQ(comparison.passed, 0u) << "the box is not that of the view";
   view.vertex_count = 49;
   expectError(dermis_compare(&posed, &view, &comparison, &error), "");
+}
+
+TEST(CMeshTest, TheDiagnosisIsThatOfCpp) {
+  static_assert(DERMIS_MISTAKE_WEIGHT_SET == static_cast<int>(PoseMistake::weightSet));
+  static_assert(DERMIS_MISTAKE_ROOT_MISSING == static_cast<int>(PoseMistake::rootMissing));
+  // A chain of joints along y, one apart, that bends; the inverse bind matrices are left out.
+  CMesh source(9, 90, 9);
+  std::vector<JointMatrix> inverse(9), local(9), globals(9);
+  std::vector<std::uint32_t> parents(9), nodes(9), triangles;
+  std::vector<std::string> names;
+  for (std::uint32_t joint = 0; joint < 9; ++joint) {
+    inverse[joint].m[1][3] = -static_cast<float>(joint);
+    local[joint] = {
+        {{0.98f, -0.199f, 0, 0}, {0.199f, 0.98f, 0, joint == 0 ? 0.0f : 1.0f}, {0, 0, 1, 0}}};
+    parents[joint] = joint == 0 ? 0xffffffff : joint - 1;
+    nodes[joint] = joint;
+    names.push_back("joint " + std::to_string(joint));
+    globals[joint] = local[joint];
+    if (joint == 0) continue;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 4; ++column) {
+        const auto& parent = globals[joint - 1].m;
+        globals[joint].m[row][column] = parent[row][0] * local[joint].m[0][column] +
+                                        parent[row][1] * local[joint].m[1][column] +
+                                        parent[row][2] * local[joint].m[2][column] +
+                                        (column == 3 ? parent[row][3] : 0);
+      }
+    }
+  }
+  for (std::uint32_t vertex = 0; vertex < 90; ++vertex) {
+    source.mesh.positions[3 * vertex] = 0.2f * static_cast<float>(vertex % 3);
+    source.mesh.positions[3 * vertex + 1] = static_cast<float>(vertex) / 10;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      source.mesh.joints[4 * vertex + i] = vertex / 10;
+      source.mesh.weights[4 * vertex + i] = 0.25f;
+    }
+    if (vertex > 1) triangles.insert(triangles.end(), {vertex - 2, vertex - 1, vertex});
+  }
+  std::vector<const char*> cNames;
+  std::vector<std::string_view> views;
+  for (const std::string& name : names) {
+    cNames.push_back(name.c_str());
+    views.push_back(name);
+  }
+  const auto matrices = [](const std::vector<JointMatrix>& of) {
+    return reinterpret_cast<const dermis_joint*>(of.data());
+  };
+  dermis_pose_input input = sized<dermis_pose_input>();
+  input.joint_count = input.node_count = 9;
+  input.joints = matrices(globals);
+  dermis_diagnosis diagnosis = sized<dermis_diagnosis>();
+  expectOk(dermis_diagnose(&source.view, &input, &diagnosis, &error));
+  Diagnosis expected = must(diagnose(source.mesh.view(), {.jointMatrices = globals}));
+  EXPECT_EQ(diagnosis.mistake, static_cast<int>(expected.mistake));
+  input.triangles = triangles.data();
+  input.index_count = triangles.size();
+  input.inverse_bind_matrices = matrices(inverse);
+  input.joint_names = cNames.data();
+  input.joint_nodes = nodes.data();
+  input.parents = parents.data();
+  input.local_transforms = matrices(local);
+  expectOk(dermis_diagnose(&source.view, &input, &diagnosis, &error));
+  expected = must(diagnose(source.mesh.view(), {.jointMatrices = globals,
+                                                .triangles = triangles,
+                                                .inverseBindMatrices = inverse,
+                                                .jointNames = views,
+                                                .jointNodes = nodes,
+                                                .parents = parents,
+                                                .localTransforms = local}));
+  EXPECT_EQ(diagnosis.mistake, DERMIS_MISTAKE_INVERSE_BIND_MISSING) << diagnosis.message;
+  EXPECT_EQ(diagnosis.message, expected.message);
+  EXPECT_EQ(diagnosis.stretch, expected.stretch);
+  EXPECT_EQ(diagnosis.mended_stretch, expected.mendedStretch);
+  input.joints = nullptr;
+  expectError(dermis_diagnose(&source.view, &input, &diagnosis, &error), "joints is null");
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST_F(CVulkanTest, LimitsAndTuningAreThoseOfCpp) {
   dermis_device_desc desc = describe();
   desc.api_version = 0;
   Owned<dermis_context> refused;
-  expectError(dermis_context_create(&desc, nullptr, nullptr, &refused, &error), "apiVersion");
+  expectError(dermis_context_create(&desc, nullptr, nullptr, &refused, &error), "api_version");
 }
 
 TEST_F(CVulkanTest, TheEnginesPipelineCacheAndAllocator) {
@@ -170,7 +170,7 @@ TEST_F(CVulkanTest, ABatchIsRecorded) {
   Owned<dermis_bindings> bindings;
   expectOk(dermis_bindings_create(second, &buffers, &bindings, &error));
   mock.dispatches.clear();
-  expectError(dermis_record_plan(second, commandBuffer, plan, bindings, &error), "prepare",
+  expectError(dermis_record_plan(second, commandBuffer, plan, bindings, &error), "dermis_prepare",
               DERMIS_NOT_PREPARED);
   dermis_instance_desc like = sized<dermis_instance_desc>();
   expectOk(dermis_prepare(second, nullptr, &like, &error));
@@ -267,7 +267,8 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
     EXPECT_TRUE(std::ranges::any_of(allocator.memory, [&](const auto& memory) {
       return reinterpret_cast<VkBuffer>(memory.get()) == info.output_buffer;
     }));
-    expectError(dermis_record(recorder, commandBuffer, VK_NULL_HANDLE, 0, &error), "beginFrame");
+    expectError(dermis_record(recorder, commandBuffer, VK_NULL_HANDLE, 0, &error),
+                "dermis_begin_frame");
     // Culled on the GPU: the visibility buffer is missing.
     figure.culled_on_gpu = 1;
     expectOk(dermis_prepare(cContext, scene, &figure, &error));

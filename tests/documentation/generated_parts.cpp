@@ -68,12 +68,7 @@ std::string numbers() {
       {"storage buffers per stage, minimum", limits.maxStorageBuffersPerStage},
       {"storage buffers per stage for bounds and snorm16 positions", storageBuffersWanted},
       {"bytes of a vertex with float32x3 positions and normals",
-       placeVertices({.normals = VertexFormat::float32x3}, 1)->attributes[0].stride},
-      {"bytes of a vertex with float16x4 positions and octahedral16x2 normals",
-       placeVertices(
-           {.positions = VertexFormat::float16x4, .normals = VertexFormat::octahedral16x2}, 1)
-           ->attributes[0]
-           .stride}};
+       placeVertices({.normals = VertexFormat::float32x3}, 1)->attributes[0].stride}};
   std::string table = "| | |\n| --- | --- |\n";
   for (const auto& [what, number] : rows)
     table += "| " + std::string(what) + " | " + std::to_string(number) + " |\n";

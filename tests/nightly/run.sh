@@ -253,8 +253,8 @@ part_gpu() {
 }
 
 part_exhaustive() {
-  build ci exhaustive_test real_models_test
-  tests ci -R '^(exhaustive_test|real_models_test)/'
+  build ci exhaustive_test real_models_test exhaustive_diagnose_test
+  tests ci -R '^(exhaustive_test|real_models_test|exhaustive_diagnose_test)/'
 }
 
 part_packages() {

@@ -9,7 +9,8 @@
 //   sentence about it, unless `error` is null; outputs are then unchanged, if the function does not
 //   say otherwise.
 // - A structure that begins with `size` may grow. The caller sets `size` to its sizeof, also in
-//   structures that a function fills. All elements of an array have the same `size`.
+//   structures that a function fills: dermis_instance_info info = {.size = sizeof info} in C99. All
+//   elements of an array have the same `size`.
 // - Zero is the default of every other member: a structure of zeros with its `size` is valid, but
 //   for what is marked as required.
 // - Nothing is kept of a pointer after the function returns, unless it says so. Lists that a
@@ -84,8 +85,9 @@ enum { DERMIS_HEADER_VERSION = 100 };
 // its minor version is not lower; while the major version is 0, if the minor versions are equal.
 DERMIS_C_API uint32_t dermis_version(void);
 
-// Destroys an object: one that a function of this header returned to its last parameter but one.
-// Null is ignored. A scene is not such an object: it belongs to its recorder, runner or commands.
+// Destroys a dermis_context, dermis_recorder, dermis_runner, dermis_commands, dermis_packed,
+// dermis_repaired, dermis_model, dermis_plan or dermis_bindings. Null is ignored. A scene belongs
+// to its recorder, runner or commands, and is not destroyed.
 DERMIS_C_API void dermis_destroy(void* object);
 
 // ---- Plain data.
@@ -131,7 +133,7 @@ typedef enum dermis_promise {
   DERMIS_PROMISE_INT32 = 0x7fffffff  // not a value
 } dermis_promise;
 
-// How the joints of a vertex are blended (docs/methods.md).
+// How the joints of a vertex are blended (docs/methods.md). glTF viewers blend linearly.
 typedef enum dermis_method {
   DERMIS_METHOD_DEFAULT = 0,  // dual quaternions
   DERMIS_METHOD_LINEAR = 1,
@@ -261,7 +263,8 @@ DERMIS_C_API dermis_code dermis_validate(const dermis_mesh_view* mesh, uint32_t 
 // A repaired copy of a mesh.
 typedef struct dermis_repaired dermis_repaired;
 // Drops influences that `dermis_pack` refuses, sets values that are not finite to 0, and clamps the
-// weights of methods. `view` gets the repaired mesh, which is valid until `repaired` is destroyed.
+// weights of methods. The remaining weights are normalized by `dermis_pack`. `view` gets the
+// repaired mesh, which is valid until `repaired` is destroyed.
 // Fails with `DERMIS_INVALID_MESH` if a view is not valid.
 DERMIS_C_API dermis_code dermis_repair(const dermis_mesh_view* mesh, uint32_t joint_count,
                                        dermis_mesh_view* view, dermis_repaired** repaired,
@@ -310,7 +313,12 @@ DERMIS_C_API dermis_code dermis_centers_of_rotation(const dermis_mesh_view* mesh
 
 // ---- What is written.
 
-// The format of one attribute of skinned vertices (layout.h). Beside it, how Vulkan reads it.
+// The format of one attribute of skinned vertices. Beside it, how Vulkan reads it. The fourth
+// component of X4 is 1 for positions, 0 for normals, and the handedness for tangents.
+//
+// Octahedral, with x and y from -1 to 1: z = 1 - |x| - |y|; if z < 0, x and y become
+// (1 - |y|) sign(x) and (1 - |x|) sign(y) of the old values; normalize. For tangents see layout.h.
+// Positions in snorm16: center + half of the size of the box × the stored value.
 typedef enum dermis_format {
   DERMIS_FORMAT_NONE = 0,            // the attribute is not written; for positions: FLOAT32X3
   DERMIS_FORMAT_FLOAT32X3 = 1,       // VK_FORMAT_R32G32B32_SFLOAT
@@ -337,7 +345,10 @@ typedef enum dermis_stream {
 
 // The attributes of skinned vertices and their arrangement: interleaved (position, normal, tangent,
 // previous position of a vertex, then the next vertex) or, if `is_planar`, one attribute after the
-// other.
+// other, with gaps: `dermis_places` says where. Positions are in FLOAT32, FLOAT16 or SNORM16
+// formats, normals in any, tangents in X4 or octahedral ones; the mesh must have what is written.
+// Previous positions are those of the frame before, in the format of the positions; in the first
+// frame, after a teleport and once a pose rests they are the current ones.
 typedef struct dermis_layout {
   dermis_format positions, normals, tangents;
   uint32_t has_motion;  // whether there are previous positions
@@ -369,10 +380,13 @@ DERMIS_C_API dermis_code dermis_place_vertices(const dermis_layout* layout, uint
 // lends it: `dermis_recorder_scene`, `dermis_runner_scene`, `dermis_commands_scene`. In each frame:
 //
 //     dermis_begin_frame(scene, frame, completed_frame, &error);
-//     memcpy(dermis_write_pose(scene, pose, NULL, &error), joints, joint_count * sizeof *joints);
+//     joints = dermis_write_pose(scene, pose, &joint_count, &error);   and fill them
 //     ... add, remove, change ...
 //     dermis_record, or dermis_runner_jobs, or dermis_commands_plan and _commit
 //     draw from the output buffer, at dermis_instance_contents
+//
+// To execute a frame means `dermis_record`, `dermis_runner_jobs`, or `dermis_commands_plan` and
+// `_commit`. Only poses that change are written; the others keep their joints
 //
 // Functions that get a scene count as functions of the object that lends it.
 
@@ -427,7 +441,7 @@ typedef struct dermis_instance_desc {
   uint32_t update_interval;  // skinned every N-th frame; 0: 1
   uint32_t culled_on_gpu;    // whether a word of the visibility buffer decides, too
 } dermis_instance_desc;
-// Adds an instance, which the next frame skins.
+// Adds an instance. The next frame that is executed skins it.
 DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
                                              dermis_instance* instance, dermis_error* error);
 // Removes an instance and its output.
@@ -496,7 +510,7 @@ typedef struct dermis_instance_info {
   dermis_mesh mesh;           // that it was last skinned with
   uint32_t has_bounds;        // whether `bounds` is known
   dermis_box bounds;          // exact, of the newest complete frame that skinned it
-  uint64_t offset;            // bytes from the beginning of the output buffer
+  uint64_t offset;            // of the instance, bytes from the beginning of the output buffer
   dermis_places places;       // offsets count from the beginning of the output buffer
 } dermis_instance_info;
 // Says where an instance is.
@@ -577,7 +591,8 @@ typedef struct dermis_runner_frame {
 } dermis_runner_frame;
 // Lists the jobs for everything that changed. Call it once after each `dermis_begin_frame` and
 // `dermis_abandon_frame`. Until the jobs are done, no other function of the runner or its scene may
-// be called. `vertices_per_job`: 0 is the default, 65536.
+// be called. `vertices_per_job`: about how many; a job may have several instances. 0: 65536. For
+// N threads, an N-th of all vertices, or a quarter of that, spreads the work.
 DERMIS_C_API dermis_code dermis_runner_jobs(dermis_runner* runner, uint32_t vertices_per_job,
                                             dermis_runner_frame* frame, dermis_error* error);
 // Runs job number `index` of the frame. The jobs of a frame may run on any threads, in any order
@@ -882,7 +897,7 @@ typedef struct dermis_clip {
 // What a model has, valid as long as it is.
 typedef struct dermis_model_info {
   uint32_t size;
-  uint32_t primitive_count;  // skinned primitives of the default scene
+  uint32_t primitive_count;  // skinned primitives of the default scene, not those that only morph
   uint32_t clip_count;
   uint32_t note_count;
   const dermis_clip* clips;
@@ -897,7 +912,8 @@ typedef struct dermis_primitive {
   uint32_t size;
   uint32_t skin;         // primitives with the same number have the same pose
   uint32_t joint_count;  // of its poses
-  // For `dermis_validate` and `dermis_pack`. Without influence sets it stays in bind pose.
+  // For `dermis_validate` and `dermis_pack`. If it has no influence sets, it is not skinned: draw
+  // it in bind pose.
   const dermis_mesh_view* mesh;
   const uint32_t* triangles;  // 3 vertex indices each
   size_t index_count;
@@ -910,9 +926,9 @@ DERMIS_C_API dermis_code dermis_model_primitive(const dermis_model* model, uint3
                                                 dermis_primitive* primitive, dermis_error* error);
 
 enum { DERMIS_REST_POSE = 0x7fffffff };  // as a clip
-// The joint matrices of a primitive at a time of a clip, in seconds, which is clamped; and the
-// weights of its morph targets, unless `morph_weights` is null. The counts must be those of the
-// primitive and of its mesh view.
+// Gets the joint matrices of a primitive at a time of a clip, in seconds, which is clamped; and the
+// weights of all its morph targets, unless `morph_weights` is null and its count 0. The counts must
+// be those of the primitive and of its mesh view.
 DERMIS_C_API dermis_code dermis_model_pose(const dermis_model* model, uint32_t primitive,
                                            uint32_t clip, double time, dermis_joint* joints,
                                            uint32_t joint_count, float* morph_weights,
@@ -948,11 +964,12 @@ typedef enum dermis_choice {
   DERMIS_CHOICE_YES = 2,
   DERMIS_CHOICE_INT32 = 0x7fffffff  // not a value
 } dermis_choice;
-// The engine's device and what the engine enabled on it (vulkan/context.h).
+// The engine's device and what the engine enabled on it. It must have Vulkan 1.1 and a queue for
+// compute; no extension or feature is needed. Two features make kernels for CPU devices faster.
 typedef struct dermis_device_desc {
   uint32_t size;
-  uint32_t api_version;                              // required: the lower of instance and device
-  VkInstance instance;                               // required
+  uint32_t api_version;  // required: of VkApplicationInfo, or of the device if that is lower
+  VkInstance instance;   // required
   VkPhysicalDevice physical_device;                  // required
   VkDevice device;                                   // required
   PFN_vkGetInstanceProcAddr get_instance_proc_addr;  // required
@@ -977,11 +994,14 @@ typedef struct dermis_context dermis_context;
 DERMIS_C_API dermis_code dermis_context_create(const dermis_device_desc* desc,
                                                dermis_limits* limits, dermis_tuning* tuning,
                                                dermis_context** context, dermis_error* error);
-// Builds every pipeline that instances like this one can need; `scene` and `desc` as for
+// Builds every pipeline that instances like this one can need. Call it before such an instance is
+// recorded. `scene` and `desc` as for
 // `dermis_list_pipelines`. May take long. Without a scene, any thread may call it.
 DERMIS_C_API dermis_code dermis_prepare(const dermis_context* context, const dermis_scene* scene,
                                         const dermis_instance_desc* desc, dermis_error* error);
-// Records a barrier for all memory between two uses. Call it outside a render pass.
+// Records a barrier for all memory between two uses, outside a render pass: before `dermis_record`
+// between the last use of the output and `DERMIS_USE_DERMIS`, and after it between that and the
+// next use. To read vertices back by a copy, also from `COPY_WRITE` to `HOST_READ` after the copy.
 DERMIS_C_API dermis_code dermis_record_barrier(const dermis_context* context,
                                                VkCommandBuffer command_buffer, uint32_t before,
                                                uint32_t after, dermis_error* error);
@@ -1027,7 +1047,7 @@ typedef struct dermis_created_buffer {
 // grow. `dermis_recorder_requirement` says what they need.
 typedef struct dermis_recorder_desc {
   uint32_t size;
-  VkBufferUsageFlags output_usage;  // 0: VK_BUFFER_USAGE_VERTEX_BUFFER_BIT
+  VkBufferUsageFlags output_usage;  // 0: VERTEX_BUFFER; add TRANSFER_SRC to read vertices back
   const dermis_scene_desc* scene;   // null: the defaults
   const dermis_tuning* tuning;      // null: that of the context
   dermis_range meshes, poses, gpu_poses, output;

@@ -21,7 +21,9 @@
 extern "C" {
 #endif
 
-// A mesh in a pose.
+// A mesh in a pose. The reference always applies scale: for a pose that ignores it, pass joints
+// without. For previous positions, pass the joints of the frame before, and their places as
+// positions.
 typedef struct dermis_posed_mesh {
   uint32_t size;
   uint32_t joint_count;
@@ -76,6 +78,56 @@ typedef struct dermis_comparison {
 DERMIS_COMPARE_API dermis_code dermis_compare(const dermis_posed_mesh* posed,
                                               const dermis_skinned_view* skinned,
                                               dermis_comparison* comparison, dermis_error* error);
+
+// Well-known mistakes of engines that compute joint matrices (verify.h, `PoseMistake`).
+typedef enum dermis_mistake {
+  DERMIS_MISTAKE_NONE = 0,
+  DERMIS_MISTAKE_UNKNOWN = 1,  // the pose is wrong, but no mistake that was tested explains it
+  DERMIS_MISTAKE_TRANSPOSED = 2,
+  DERMIS_MISTAKE_COLUMN_MAJOR = 3,
+  DERMIS_MISTAKE_INVERSE_BIND_MISSING = 4,
+  DERMIS_MISTAKE_INVERSE_BIND_TWICE = 5,
+  DERMIS_MISTAKE_INVERSE_BIND_WRONG_SIDE = 6,
+  DERMIS_MISTAKE_JOINTS_IN_NODE_ORDER = 7,
+  DERMIS_MISTAKE_JOINTS_SORTED_BY_NAME = 8,
+  DERMIS_MISTAKE_JOINTS_OFF_BY_ONE = 9,
+  DERMIS_MISTAKE_ROOT_MISSING = 10,
+  DERMIS_MISTAKE_ROOT_TWICE = 11,
+  DERMIS_MISTAKE_UNITS = 12,
+  DERMIS_MISTAKE_AXES = 13,
+  DERMIS_MISTAKE_QUATERNION_ORDER = 14,
+  DERMIS_MISTAKE_WEIGHT_SET = 15,
+  DERMIS_MISTAKE_INT32 = 0x7fffffff  // not a value
+} dermis_mistake;
+
+// A pose, and what is known of its skeleton (verify.h, `PoseInput`). Mistakes that need what is
+// null are not tested; most are certain only with the local transforms.
+typedef struct dermis_pose_input {
+  uint32_t size;
+  uint32_t joint_count;
+  const dermis_joint* joints;  // required: those that the mesh is skinned with
+  const uint32_t* triangles;   // 3 vertex indices each
+  size_t index_count;
+  const dermis_joint* inverse_bind_matrices;  // one for each joint
+  const char* const* joint_names;             // one for each joint
+  const uint32_t* joint_nodes;                // the node of each joint; null: joint j is node j
+  const uint32_t* parents;                    // the parent of each node; a root's does not exist
+  const dermis_joint* local_transforms;       // of each node, relative to its parent
+  uint32_t node_count;                        // of the last two
+} dermis_pose_input;
+// What was found.
+typedef struct dermis_diagnosis {
+  uint32_t size;
+  dermis_mistake mistake;
+  double stretch,
+      mended_stretch;  // of edges between joints, before and after the mistake is mended
+  char message[504];   // the mistake, and the line of code that mends it; empty if there is none
+} dermis_diagnosis;
+// Finds out whether a pose is plausible for a mesh, and if not, which mistake explains it. For
+// debug builds: call it with the first pose of an instance.
+DERMIS_COMPARE_API dermis_code dermis_diagnose(const dermis_mesh_view* mesh,
+                                               const dermis_pose_input* input,
+                                               dermis_diagnosis* diagnosis, dermis_error* error);
 
 #ifdef __cplusplus
 }

@@ -250,9 +250,8 @@ DERMIS_VERIFY_API const char* poseMistakeName(PoseMistake mistake);
 /// - If the skeleton is known with its local transforms, the right joint matrices are computed from
 ///   it. If those of the input differ, the mistake that makes them equal is named.
 /// - Otherwise, and if the local transforms may be wrong themselves, each mistake is undone, and
-/// the
-///   result is measured: how edges are stretched, how far joints are from where their parents take
-///   them, and how far the pose is from the bind pose.
+///   then the result is measured: how edges are stretched, how far joints are from where their
+///   parents take them, and how far the pose is from the bind pose.
 /// - Mistakes that move the whole model (root transform, its scale) are found only by the first.
 /// - Morph targets and the method have no effect. A sample of the edges is measured: it takes some
 ///   milliseconds for each mesh.

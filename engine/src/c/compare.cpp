@@ -90,4 +90,36 @@ dermis_code dermis_compare(const dermis_posed_mesh* posed, const dermis_skinned_
   });
 }
 
+dermis_code dermis_diagnose(const dermis_mesh_view* mesh, const dermis_pose_input* callers,
+                            dermis_diagnosis* diagnosis, dermis_error* error) {
+  return guarded(error, [&] {
+    const View view(mesh);
+    const dermis_pose_input input = in(callers, "input");
+    checkOut(diagnosis, "diagnosis");
+    const std::uint32_t joints = input.joint_count, nodes = input.node_count;
+    const auto optional = [](const auto* first, std::size_t count) {
+      return std::span(first, first == nullptr ? 0 : count);
+    };
+    const auto matrices = [](const dermis_joint* first, std::uint32_t count) {
+      return jointsOf(first, first == nullptr ? 0 : count, "matrices");
+    };
+    std::vector<std::string_view> names;
+    for (const char* name : optional(input.joint_names, joints)) names.push_back(text(name));
+    const Diagnosis found = must(
+        diagnose(view.mesh, {.jointMatrices = jointsOf(input.joints, joints, "joints"),
+                             .triangles = array(input.triangles, input.index_count, "triangles"),
+                             .inverseBindMatrices = matrices(input.inverse_bind_matrices, joints),
+                             .jointNames = names,
+                             .jointNodes = optional(input.joint_nodes, joints),
+                             .parents = optional(input.parents, nodes),
+                             .localTransforms = matrices(input.local_transforms, nodes)}));
+    dermis_diagnosis result{};
+    result.mistake = static_cast<dermis_mistake>(found.mistake);
+    result.stretch = found.stretch;
+    result.mended_stretch = found.mendedStretch;
+    cutTo(result.message, found.message);
+    give(diagnosis, result);
+  });
+}
+
 }  // extern "C"

@@ -130,7 +130,7 @@ dermis_code dermis_model_pose(const dermis_model* model, uint32_t primitive, uin
            std::to_string(pose.size()) + " joints");
     }
     const std::uint32_t targets = source.views[primitive].mesh.morph_target_count;
-    if (morph_weights != nullptr && morph_weight_count != targets) {
+    if (morph_weights != nullptr ? morph_weight_count != targets : morph_weight_count != 0) {
       fail("morph_weight_count is " + std::to_string(morph_weight_count) +
            ", but the primitive has " + std::to_string(targets) + " morph targets");
     }

@@ -1,24 +1,70 @@
 #include "object.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace dermis::c {
+namespace {
+
+/// What messages of C++ name, and its name in C. Longer names come before those that they contain.
+constexpr std::pair<std::string_view, std::string_view> names[] = {
+    {"SceneRecorder::prepare", "dermis_prepare"},
+    {"Context::prepare", "dermis_prepare"},
+    {"SceneRecorder::requirement", "dermis_recorder_requirement"},
+    {"Context::limits()", "the limits of dermis_context_create"},
+    {"DeviceDescription::apiVersion", "api_version"},
+    {"Batch::isOneOutput", "has_separate_outputs"},
+    {"MeshView::influenceSets", "influence_sets"},
+    {"influenceSets", "influence_sets"},
+    {"makePlan", "dermis_make_plan"},
+    {"beginFrame", "dermis_begin_frame"},
+    {"abandonFrame", "dermis_abandon_frame"},
+    {"writePose", "dermis_write_pose"},
+    {"markWritten", "dermis_mark_written"},
+    {"repair()", "dermis_repair"},
+    {"framesInFlight", "frames_in_flight"},
+    {"gpuJointCapacity", "gpu_joints"},
+    {"jointCapacity", "joints"},
+    {"meshCapacity", "mesh_bytes"},
+    {"outputCapacity", "output_bytes"},
+    {"instanceCapacity", "instances"},
+    {"boundsCapacity", "bounds"},
+    {"getInstanceProcAddr", "get_instance_proc_addr"},
+    {"physicalDevice", "physical_device"}};
+
+/// A message in the words of C. Names of the caller are in quotes and stay.
+std::string inWordsOfC(std::string message) {
+  for (const auto& [cpp, c] : names) {
+    for (std::size_t place = message.find(cpp); place != std::string::npos;
+         place = message.find(cpp, place + 1)) {
+      const auto end = message.begin() + static_cast<std::ptrdiff_t>(place);
+      if (std::count(message.begin(), end, '\'') % 2 == 0) message.replace(place, cpp.size(), c);
+    }
+  }
+  return message;
+}
+
+}  // namespace
+
+void cutTo(char (&buffer)[504], std::string_view message) {
+  std::size_t length = std::min(message.size(), sizeof(buffer) - 1);
+  if (length < message.size()) {
+    while (length > 0 && (static_cast<unsigned char>(message[length]) & 0xc0) == 0x80) --length;
+  }
+  std::memcpy(buffer, message.data(), length);
+  buffer[length] = '\0';
+}
 
 dermis_code report(dermis_error* error, dermis_code code, std::string_view message,
                    std::int32_t vulkanResult) {
   if (error == nullptr) return code;
   error->code = code;
   error->vulkan_result = vulkanResult;
-  std::size_t length = std::min(message.size(), sizeof(error->message) - 1);
-  // A cut message does not end inside a character.
-  if (length < message.size()) {
-    while (length > 0 && (static_cast<unsigned char>(message[length]) & 0xc0) == 0x80) --length;
-  }
-  std::memcpy(error->message, message.data(), length);
-  error->message[length] = '\0';
+  cutTo(error->message, inWordsOfC(std::string(message)));
   return code;
 }
 

@@ -52,6 +52,9 @@ T must(Result<T> result) {
   if constexpr (!std::is_void_v<T>) return std::move(result).value();
 }
 
+/// Writes a message to the caller's buffer. If it is cut, it does not end inside a character.
+void cutTo(char (&buffer)[504], std::string_view message);
+
 /// Fills the caller's error, and returns its code.
 dermis_code report(dermis_error* error, dermis_code code, std::string_view message,
                    std::int32_t vulkanResult = 0);
