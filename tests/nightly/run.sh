@@ -13,7 +13,7 @@
 #   x86          the same for 32-bit x86, run by this machine
 #   arm64        the same for arm64, run by qemu
 #   libcxx       the same by Clang with libc++
-#   fuzz         each fuzzer for a minute
+#   fuzz         each fuzzer for a minute, calls of the C interface for four
 #   mutants      over two hundred mistakes planted in the engine, one at a time; a test must catch each (tests/mutants)
 #   mesa         the device tests, ray tracing among them, and `dermis verify` on the lavapipe of Debian's backports
 #   speed        `dermis bench` on both lavapipes: ratios within one run, with much room for a noisy machine
@@ -181,7 +181,9 @@ part_fuzz() {
     corpus=build/fuzz/corpus/$fuzzer
     mkdir -p "$corpus"
     echo "$fuzzer ..."
-    "build/fuzz/tests/fuzz/$fuzzer" -rss_limit_mb=2048 -timeout=10 -max_total_time=60 -print_final_stats=1 \
+    seconds=60
+    [ "$fuzzer" != c_calls_fuzz ] || seconds=240 # over a million calls
+    "build/fuzz/tests/fuzz/$fuzzer" -rss_limit_mb=2048 -timeout=10 -max_total_time="$seconds" -print_final_stats=1 \
       -artifact_prefix=build/fuzz/ "$corpus" tests/fuzz/seeds >"build/fuzz/$fuzzer.log" 2>&1 ||
       { tail -n 40 "build/fuzz/$fuzzer.log"; return 1; }
     awk '/number_of_executed_units/ { print $2 }' "build/fuzz/$fuzzer.log" >>"$figures"

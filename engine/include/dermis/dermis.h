@@ -603,17 +603,19 @@ DERMIS_C_API dermis_code dermis_run_job(const dermis_runner* runner, uint32_t in
 // ---- Commands: a batch that the engine keeps the books of, or a scene for an engine with its own
 // RHI. `dermis_record_plan` records those of a batch.
 
-// Limits of a device (plan.h). 0: what every Vulkan device has, which is too little for bounds
-// and positions in snorm16. `dermis_context_create` fills them.
+// Limits of a device: the VkPhysicalDeviceLimits of the same names, `max_storage_buffers_per_stage`
+// is maxPerStageDescriptorStorageBuffers (plan.h). 0: what every Vulkan device has, which is too
+// little for bounds and positions in snorm16. `dermis_context_create` fills them.
 typedef struct dermis_limits {
   uint32_t size;
   uint32_t min_storage_buffer_offset_alignment;
   uint64_t max_storage_buffer_range;
   uint32_t max_workgroup_count_x, max_workgroup_count_y;
   uint32_t max_storage_buffers_per_stage;
-  uint32_t one_output_range;       // whether a dispatch can bind only one window of the output
-  uint32_t texel_buffers;          // whether kernels are those for CPU devices
-  uint32_t staged_stores;          // whether kernels store interleaved vertices widely
+  uint32_t one_output_range;  // whether a dispatch can bind only one window of the output
+  uint32_t texel_buffers;     // // whether kernels are those for CPU devices: needs shaderInt64
+                              // and scalarBlockLayout
+  uint32_t staged_stores;     // whether kernels store interleaved vertices widely
   uint32_t no_comparison_methods;  // whether kernels of methods for comparison are missing
 } dermis_limits;
 // How work is divided; it affects speed only. 0: the default.
@@ -771,8 +773,9 @@ DERMIS_C_API dermis_code dermis_plan_contents(const dermis_plan* plan, dermis_pl
 DERMIS_C_API dermis_code dermis_write_tables(const dermis_plan* plan, void* bytes,
                                              size_t byte_count, dermis_error* error);
 
-// Lists the pipelines that instances like this one can need, at most `capacity`; `count` gets how
-// many there are. With a scene and valid handles, only for the same kind of mesh and pose; without
+// Lists the pipelines that instances like this one can need, at most `capacity`, which may be 0;
+// `count` gets how many there are. Limits and tuning are those of the commands. With a scene and
+// valid handles, only for the same kind of mesh and pose; without
 // (`scene` may be null), for any. For an engine with its own RHI; others call `dermis_prepare`.
 DERMIS_C_API dermis_code dermis_list_pipelines(const dermis_scene* scene,
                                                const dermis_instance_desc* desc,
@@ -788,7 +791,9 @@ typedef struct dermis_pipeline_info {
   char module[64];         // its name
   uint32_t constants[32];  // specialization constants from id 0 on
   uint32_t constant_count;
-  uint32_t storage_buffers, texel_buffers;  // in slots from 0 on, one kind after the other
+  // In slots from 0 on, first the storage buffers. A dispatch binds only those that it uses: the
+  // descriptors of the others need not be written. Push constants: at most 9 words.
+  uint32_t storage_buffers, texel_buffers;
 } dermis_pipeline_info;
 // Describes a pipeline that a plan or `dermis_list_pipelines` named. Needs no device.
 DERMIS_C_API dermis_code dermis_describe_pipeline(uint64_t pipeline, dermis_pipeline_info* info,
@@ -799,7 +804,9 @@ typedef struct dermis_scene_buffer {
   uint32_t size;
   uint32_t number;  // by which commands name it
   dermis_buffer_role role;
-  uint32_t is_mapped;  // whether the scene writes or reads it through a mapping, if it gets one
+  // Whether the scene writes (POSES) or reads (READ_BACK) it through a mapping, if it gets one, of
+  // host-coherent memory. Poses that are mapped are not uploaded.
+  uint32_t is_mapped;
   dermis_requirement requirement;
 } dermis_scene_buffer;
 // What commands need to know.
@@ -808,10 +815,13 @@ typedef struct dermis_commands_desc {
   const dermis_scene_desc* scene;  // null: the defaults
   const dermis_limits* limits;     // null: those that every Vulkan device has
   const dermis_tuning* tuning;     // null: the default
-  uint64_t output_offset;          // of the output, if it is a part of a larger buffer
+  // Of the output, if it is a part of a larger buffer: dermis_instance_info counts from the
+  // beginning of that buffer, commands from here.
+  uint64_t output_offset;
   void* user;
-  // Required. Creates a buffer; `mapped` gets the address of its first byte, or null. If it fails,
-  // the scene may ask for a smaller one. Neither function may call the scene.
+  // Required. Creates a buffer, when the commands are created, when something is added or changed,
+  // and in `dermis_commands_plan`; `mapped` gets the address of its first byte, or null. If it
+  // fails, the scene may ask for a smaller one. Neither function may call the scene.
   dermis_code (*create_buffer)(void* user, const dermis_scene_buffer* buffer, void** mapped,
                                dermis_error* error);
   // Required. Releases a buffer that no frame in flight uses. Buffers that remain when the
@@ -825,7 +835,10 @@ DERMIS_C_API dermis_code dermis_commands_create(const dermis_commands_desc* desc
                                                 dermis_commands** commands, dermis_error* error);
 // Valid until the commands are destroyed. Null if `commands` is null.
 DERMIS_C_API dermis_scene* dermis_commands_scene(dermis_commands* commands);
-// Lists the commands for everything that changed since the last `dermis_commands_commit`. They are
+// Lists the commands for everything that changed since the last `dermis_commands_commit`. The list
+// has the barriers between its commands and to the frames before. The engine adds those between its
+// own uses of the output and `DERMIS_USE_DERMIS`, before and after; and after it, for a read-back
+// buffer that it copies further, that from COPY_WRITE to COPY_READ. They are
 // valid until the next call of a function of the scene or of this object.
 DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands,
                                               const dermis_command** list, uint32_t* count,
@@ -834,7 +847,9 @@ DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands,
 // the output buffer, and may be null.
 DERMIS_C_API dermis_code dermis_commands_commit(dermis_commands* commands, uint32_t* output_buffer,
                                                 dermis_error* error);
-// For read-back buffers that are not mapped: reads the results of a complete frame.
+// For read-back buffers that are not mapped: reads the results of a complete frame, after the
+// `dermis_begin_frame` that reported it, in ascending order. `bytes` are the whole READ_BACK buffer
+// that a DERMIS_COPY of that frame wrote; `byte_count` is 0 if none did.
 DERMIS_C_API dermis_code dermis_commands_read_back(dermis_commands* commands, uint64_t frame,
                                                    const void* bytes, size_t byte_count,
                                                    dermis_error* error);
@@ -845,7 +860,7 @@ DERMIS_C_API dermis_code dermis_commands_pose_part(const dermis_commands* comman
 
 // How a buffer is used before or after Dermis. Combine uses by |.
 typedef enum dermis_use {
-  DERMIS_USE_DERMIS = 1,
+  DERMIS_USE_DERMIS = 1,  // what compute shaders of Dermis read and write; no list has it
   DERMIS_USE_VERTEX_INPUT = 2,
   DERMIS_USE_VERTEX_SHADER = 4,
   DERMIS_USE_FRAGMENT_SHADER = 8,
