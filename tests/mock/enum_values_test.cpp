@@ -432,6 +432,10 @@ TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
     EXPECT_TRUE(value < 22 || !refusedByPack(problem));
     EXPECT_EQ(MeshReport().find(problem), nullptr);
 
+    EXPECT_EQ(poseMistakeName(number<PoseMistake>(value)) == std::string("unknown"),
+              value == 1 || value > 15)
+        << poseMistakeName(number<PoseMistake>(value));
+
     // Barriers that Vulkan accepts: with stages on both sides.
     const auto use = static_cast<Use>(value << 8);
     for (const vulkan::Barrier& barrier :
@@ -469,8 +473,8 @@ TEST_F(EnumValuesTest, FunctionsThatCannotFailHaveAnAnswerForEveryNumber) {
 TEST_F(EnumValuesTest, NoEnumIsMissing) {
   const std::set<std::string> known{
       "Method", "VertexFormat", "PipelineId", "BufferRole", "ComponentType", "MeshProblem",
-      "ErrorCode", "Use", "QueueTransfer", "ShaderStage", "Interpolation", "ChannelPath",
-      "MissingNormals", "JointPromise",
+      "ErrorCode", "Use", "QueueTransfer", "PoseMistake", "ShaderStage", "Interpolation",
+      "ChannelPath", "MissingNormals", "JointPromise",
       // No function reads one: an index of arrays, bit masks, and what functions return.
       "Stream", "DeviceFeature", "BufferUse", "AlphaMode", "Wrap"};
   std::set<std::string> found;
