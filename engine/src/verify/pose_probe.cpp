@@ -194,8 +194,7 @@ void PoseProbe::keepEdges(const MeshView& mesh, const std::vector<Edge>& edges) 
   }
   for (const Weight& weight : weights_) usedJoints_.push_back(weight.joint);
   std::ranges::sort(usedJoints_);
-  const auto repeated = std::ranges::unique(usedJoints_);
-  usedJoints_.erase(repeated.begin(), repeated.end());
+  usedJoints_.erase(std::unique(usedJoints_.begin(), usedJoints_.end()), usedJoints_.end());
 }
 
 std::vector<dvec3> PoseProbe::skin(const Pose& pose) const {
