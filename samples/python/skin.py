@@ -109,12 +109,12 @@ frame_jobs = new("dermis_runner_frame")
 seconds = math.inf
 with ThreadPoolExecutor(os.cpu_count()) as threads:
     for frame in range(1, arguments.frames + 1):
-        moved = [(pose, joints_of(part, number, frame)) for number, figure in enumerate(figures) for part, pose, _ in figure]
+        moved = [(pose, ffi.from_buffer(joints_of(part, number, frame))) for number, figure in enumerate(figures) for part, pose, _ in figure]
         begin = time.perf_counter()
         must(dermis.dermis_begin_frame(scene, frame, frame - 1, error))
+        write, copy, null = dermis.dermis_write_pose, ffi.memmove, ffi.NULL
         for pose, joints in moved:
-            memory = dermis.dermis_write_pose(scene, pose, ffi.NULL, error) or must(error.code)
-            ffi.memmove(memory, joints.data, joints.nbytes)
+            copy(write(scene, pose, null, error) or must(error.code), joints, len(joints))
         must(dermis.dermis_runner_jobs(runner, 0, frame_jobs, error))
         # cffi releases the interpreter's lock during a call, so the jobs run at the same time. Each thread takes the next one.
         jobs = iter(range(frame_jobs.job_count))
