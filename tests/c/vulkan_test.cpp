@@ -181,7 +181,7 @@ TEST_F(CVulkanTest, ABatchIsRecorded) {
   expectError(dermis_bindings_create(second, &buffers, &misaligned, &error), "");
 }
 
-/// The engine's allocator, with handles of its own.
+/// The engine's allocator. A handle is the address of the buffer's memory.
 struct Allocator {
   static dermis_code create(void* user, const VkBufferCreateInfo* info, dermis_memory_use use,
                             const char* name, dermis_created_buffer* buffer,

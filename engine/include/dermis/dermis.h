@@ -600,8 +600,8 @@ DERMIS_C_API dermis_code dermis_runner_jobs(dermis_runner* runner, uint32_t vert
 DERMIS_C_API dermis_code dermis_run_job(const dermis_runner* runner, uint32_t index,
                                         dermis_error* error);
 
-// ---- Commands: a batch that the engine keeps the books of, or a scene for an engine with its own
-// RHI. `dermis_record_plan` records those of a batch.
+// ---- Commands, as plain data: those of a batch, which `dermis_record_plan` can record, and those
+// of the frames of a scene, for an engine with its own RHI.
 
 // Limits of a device: the VkPhysicalDeviceLimits of the same names, `max_storage_buffers_per_stage`
 // is maxPerStageDescriptorStorageBuffers (plan.h). 0: what every Vulkan device has, which is too

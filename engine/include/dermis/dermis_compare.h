@@ -35,8 +35,8 @@ typedef struct dermis_posed_mesh {
 } dermis_posed_mesh;
 
 // Skins a mesh in double precision: 3 numbers for each position and normal, 4 for each tangent. The
-// counts are those of the numbers. Null: not wanted. Fails if the mesh has no normals or tangents
-// that are wanted.
+// counts are those of the numbers. An array may be null. Fails if there is an array for normals or
+// tangents and the mesh has none.
 DERMIS_COMPARE_API dermis_code dermis_reference_skin(const dermis_posed_mesh* posed,
                                                      double* positions, size_t position_count,
                                                      double* normals, size_t normal_count,

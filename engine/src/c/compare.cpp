@@ -1,4 +1,4 @@
-// The reference. A library of its own, so that no engine has to ship it.
+// The reference and `diagnose`. They are a separate library, since engines do not ship them.
 #include "dermis/dermis_compare.h"
 
 #include <algorithm>

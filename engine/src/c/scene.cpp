@@ -1,4 +1,4 @@
-// The functions of a scene, whoever executes its frames.
+// The functions of a scene: the same for recorders, runners and commands.
 #include "convert.h"
 
 using namespace dermis;
