@@ -2,6 +2,7 @@
 // the whole process, and the engine may use it too.
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <string>
 
 #include "cpu/kernels.h"
@@ -21,11 +22,14 @@ constexpr const InstructionSet* instructionSets[] = {
 #ifdef DERMIS_CPU_HAS_SSE4
     &sse4,
 #endif
+#ifdef DERMIS_CPU_HAS_BASELINE
     &baseline,
+#endif
 };
 
 bool isUsable(const InstructionSet& set) {
-  return &set == &baseline || (hwy::SupportedTargets() & set.target) != 0;
+  return &set == *std::prev(std::end(instructionSets)) ||
+         (hwy::SupportedTargets() & set.target) != 0;
 }
 
 const InstructionSet* best() {

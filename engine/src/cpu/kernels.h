@@ -1,11 +1,15 @@
-// The instruction sets that this build has code for. Each has a source file, kernels_*.cpp.
+// The instruction sets that this build has code for. Each has a source file, kernels_*.cpp. With
+// DERMIS_CPU_ONLY_SSE4 it is that one: for tests.
 #pragma once
 
 #include <cstdint>
 
 #include "cpu/task.h"
 
-#if (defined(__x86_64__) || defined(_M_X64)) && !defined(DERMIS_CPU_NO_AVX)
+#ifndef DERMIS_CPU_ONLY_SSE4
+#define DERMIS_CPU_HAS_BASELINE
+#endif
+#if (defined(__x86_64__) || defined(_M_X64)) && !defined(DERMIS_CPU_ONLY_SSE4)
 #define DERMIS_CPU_HAS_AVX2
 #if !defined(_MSC_VER) || defined(__clang__)  // Highway considers it broken with cl
 #define DERMIS_CPU_HAS_AVX3

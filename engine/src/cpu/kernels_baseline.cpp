@@ -3,6 +3,7 @@
 // for EMU128, which is plain code. The fallback has only the stages (stages_inl.h).
 #include "cpu/kernels.h"
 
+#ifdef DERMIS_CPU_HAS_BASELINE
 #ifdef DERMIS_CPU_HAS_SSE4
 #define DERMIS_CPU_STAGES_ONLY
 #define DERMIS_CPU_SSE2 (1LL << 14)  // HWY_SSE2, which Highway 1.0 does not define
@@ -19,3 +20,4 @@
 namespace dermis::cpu {
 constinit const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask};
 }
+#endif
