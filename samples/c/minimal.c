@@ -135,8 +135,8 @@ int main(void) {
     // [frame]
     // `frame - 1`: the newest frame that the GPU has completed. This program waits for each.
     must(dermis_begin_frame(scene, frame, frame - 1, &error));
-    dermis_joint* memory = dermis_write_pose(scene, figure.pose, NULL, &error);
-    if (memory == NULL) must(error.code);
+    dermis_joint* memory;
+    must(dermis_write_poses(scene, &figure.pose, 1, &memory, NULL, &error));
     memcpy(memory, pose, sizeof pose);
     must(dermis_record_barrier(context, cmd, DERMIS_USE_COPY_READ, DERMIS_USE_DERMIS, &error));
     must(dermis_record(recorder, cmd, VK_NULL_HANDLE, 0, &error));

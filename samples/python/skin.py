@@ -106,15 +106,18 @@ def joints_of(part, figure, frame):
 
 # [frame]
 frame_jobs = new("dermis_runner_frame")
+moved = [(number, part, pose) for number, figure in enumerate(figures) for part, pose, _ in figure]
+poses = ffi.new("dermis_pose[]", [pose for _, _, pose in moved])
+memory = ffi.new("dermis_joint *[]", len(poses))
 seconds = math.inf
 with ThreadPoolExecutor(os.cpu_count()) as threads:
     for frame in range(1, arguments.frames + 1):
-        moved = [(pose, ffi.from_buffer(joints_of(part, number, frame))) for number, figure in enumerate(figures) for part, pose, _ in figure]
+        matrices = [ffi.from_buffer(joints_of(part, number, frame)) for number, part, _ in moved]
         begin = time.perf_counter()
         must(dermis.dermis_begin_frame(scene, frame, frame - 1, error))
-        write, copy, null = dermis.dermis_write_pose, ffi.memmove, ffi.NULL
-        for pose, joints in moved:
-            copy(write(scene, pose, null, error) or must(error.code), joints, len(joints))
+        must(dermis.dermis_write_poses(scene, poses, len(poses), memory, ffi.NULL, error))
+        for target, joints in zip(memory, matrices):
+            ffi.memmove(target, joints, len(joints))
         must(dermis.dermis_runner_jobs(runner, 0, frame_jobs, error))
         # cffi releases the interpreter's lock during a call, so the jobs run at the same time. Each thread takes the next one.
         jobs = iter(range(frame_jobs.job_count))

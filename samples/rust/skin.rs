@@ -107,16 +107,14 @@ fn skin(path: &str, figures: u32) -> Result<bool, String> {
     }
 
     must(|error| unsafe { dermis_begin_frame(scene, 1, 0, error) })?;
-    for part in &parts {
+    let poses: Vec<dermis_pose> = parts.iter().map(|part| part.pose).collect();
+    let mut memory = vec![null_mut(); poses.len()];
+    must(|error| unsafe {
+        dermis_write_poses(scene, poses.as_ptr(), poses.len() as u32, memory.as_mut_ptr(), null_mut(), error)
+    })?;
+    for (part, memory) in parts.iter().zip(memory) {
         // The memory is only written. A slice of it would promise that it can be read.
-        must(|error| unsafe {
-            let memory = dermis_write_pose(scene, part.pose, null_mut(), error);
-            if memory.is_null() {
-                return (*error).code;
-            }
-            copy_nonoverlapping(part.joints.as_ptr(), memory, part.joints.len());
-            DERMIS_OK
-        })?;
+        unsafe { copy_nonoverlapping(part.joints.as_ptr(), memory, part.joints.len()) };
     }
     let mut frame = sized!(dermis_runner_frame);
     must(|error| unsafe { dermis_runner_jobs(runner.0, 0, &mut frame, error) })?;

@@ -76,11 +76,10 @@ struct Twins {
   void write(std::size_t pose, std::uint32_t seed) {
     const Pose joints = systemPose(seed);
     std::ranges::copy(joints, must(same.scene().writePose(poses[pose])).begin());
-    std::uint32_t count = 0;
-    dermis_joint* memory = dermis_write_pose(scene, cPoses[pose], &count, &error);
-    ASSERT_NE(memory, nullptr) << error.message;
-    ASSERT_EQ(count, jointCount);
-    std::memcpy(memory, joints.data(), count * sizeof(*memory));
+    dermis_joint* memory = nullptr;
+    expectOk(dermis_write_poses(scene, &cPoses[pose], 1, &memory, nullptr, &error));
+    ASSERT_NE(memory, nullptr);
+    std::memcpy(memory, joints.data(), joints.size() * sizeof(*memory));
   }
   void change(const InstanceChange& change, dermis_change sameInC) {
     must(same.scene().change(change));
@@ -311,9 +310,36 @@ TEST(CSceneTest, RemovedAndWrongHandlesAreRefused) {
   expectError(dermis_remove_pose(twins.scene, wrong, &error), "pose: this is the handle of a mesh");
   wrong.kind = 77;
   expectError(dermis_remove_pose(twins.scene, wrong, &error), "nothing that Dermis made");
-  EXPECT_EQ(dermis_write_pose(twins.scene, wrong, nullptr, &error), nullptr);
   dermis_destroy(twins.scene);  // it is lent: nothing happens
   expectOk(dermis_remove_mesh(twins.scene, twins.cMeshes[0], &error));
+}
+
+TEST(CSceneTest, SeveralPosesAreWrittenUntilOneFails) {
+  Twins twins;
+  for (std::size_t i = 0; i < 3; ++i) twins.addPose();
+  twins.begin();
+  dermis_joint* joints[3] = {};
+  std::uint32_t counts[3] = {};
+  expectOk(dermis_write_poses(twins.scene, twins.cPoses.data(), 3, joints, counts, &error));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(counts[i], jointCount);
+    dermis_joint* alone = nullptr;
+    expectOk(dermis_write_poses(twins.scene, &twins.cPoses[i], 1, &alone, nullptr, &error));
+    EXPECT_EQ(alone, joints[i]);
+    for (std::size_t j = 0; j < i; ++j) EXPECT_NE(joints[i], joints[j]);
+  }
+  dermis_joint* const first = joints[0];
+  twins.cPoses[1].kind = 77;
+  expectError(dermis_write_poses(twins.scene, twins.cPoses.data(), 3, joints, counts, &error),
+              "nothing that Dermis made");
+  EXPECT_EQ(joints[0], first);
+  EXPECT_EQ(counts[0], jointCount);
+  for (std::size_t i = 1; i < 3; ++i) {
+    EXPECT_EQ(joints[i], nullptr);
+    EXPECT_EQ(counts[i], 0u);
+  }
+  expectError(dermis_write_poses(twins.scene, twins.cPoses.data(), 3, nullptr, counts, &error),
+              "joints");
 }
 
 TEST(CSceneTest, JobsEndWithTheFrame) {

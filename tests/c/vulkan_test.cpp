@@ -308,7 +308,8 @@ TEST_F(CVulkanTest, ARangeOfTheEngine) {
   poseDesc.joint_count = 8;
   dermis_pose pose{};
   expectOk(dermis_add_poses(scene, &poseDesc, 1, &pose, &error));
-  const dermis_joint* memory = dermis_write_pose(scene, pose, nullptr, &error);
+  dermis_joint* memory = nullptr;
+  expectOk(dermis_write_poses(scene, &pose, 1, &memory, nullptr, &error));
   EXPECT_GE(memory, poses.data());
   EXPECT_LT(memory, poses.data() + poses.size());
   dermis_recorder_info info = sized<dermis_recorder_info>();

@@ -366,17 +366,23 @@ class Caller : Imports {
   }
   void writePose() { writePoseOf(anyEngine()); }
   void writePoseOf(Engine& engine) {
-    const auto handle = pick<dermis_pose>(engine.poses);
-    const LivePose* pose = find(engine.poses, handle);
-    std::uint32_t count = 0;
-    dermis_error error{};
-    ++calls;
-    dermis_joint* joints = dermis_write_pose(engine.scene, handle, &count, orNull(&error));
-    expect((joints != nullptr) == (pose && !pose->isGpu && !engine.isExecuted));
-    expect(count == (joints != nullptr ? pose->joints : 0));
-    if (joints == nullptr) return;
-    const std::uint32_t written = seldom() ? number(0, count) : count;
-    if (!fill(joints, written) || written < count) engine.isFinite = false;
+    std::vector<dermis_pose> poses(number(1, 3));
+    for (dermis_pose& pose : poses) pose = pick<dermis_pose>(engine.poses);
+    dermis_joint* joints[3] = {};
+    std::uint32_t counts[3] = {};
+    const auto code = call({}, dermis_write_poses, engine.scene, poses.data(), sizeOf(poses),
+                           joints, oneOf(4) ? nullptr : counts);
+    bool isGood = !engine.isExecuted;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const LivePose* pose = find(engine.poses, poses[i]);
+      isGood = isGood && pose && !pose->isGpu;
+      expect((joints[i] != nullptr) == isGood);
+      expect(counts[i] == 0 || (isGood && counts[i] == pose->joints));
+      if (!isGood) continue;
+      const std::uint32_t written = seldom() ? number(0, pose->joints) : pose->joints;
+      if (!fill(joints[i], written) || written < pose->joints) engine.isFinite = false;
+    }
+    expect((code == DERMIS_OK) == isGood);
   }
   void markWritten() {
     Engine& engine = anyEngine();

@@ -380,15 +380,14 @@ DERMIS_C_API dermis_code dermis_place_vertices(const dermis_layout* layout, uint
 // lends it: `dermis_recorder_scene`, `dermis_runner_scene`, `dermis_commands_scene`. In each frame:
 //
 //     dermis_begin_frame(scene, frame, completed_frame, &error);
-//     joints = dermis_write_pose(scene, pose, &joint_count, &error);   and fill them
+//     dermis_write_poses(scene, poses, count, joints, NULL, &error);   and fill what they point to
 //     ... add, remove, change ...
 //     dermis_record, or dermis_runner_jobs, or dermis_commands_plan and _commit
 //     draw from the output buffer, at dermis_instance_contents
 //
 // To execute a frame means `dermis_record`, `dermis_runner_jobs`, or `dermis_commands_plan` and
-// `_commit`. Only poses that change are written; the others keep their joints
-//
-// Functions that get a scene count as functions of the object that lends it.
+// `_commit`. Only poses that change are written; the others keep their joints. Functions that get a
+// scene count as functions of the object that lends it.
 
 typedef struct dermis_scene dermis_scene;
 
@@ -418,7 +417,7 @@ DERMIS_C_API dermis_code dermis_remove_mesh(dermis_scene* scene, dermis_mesh mes
 typedef struct dermis_pose_desc {
   uint32_t size;
   uint32_t joint_count;     // required: 1 to 65536
-  uint32_t written_by_gpu;  // 0: the CPU writes it, to what `dermis_write_pose` returns
+  uint32_t written_by_gpu;  // 0: the CPU writes it, where `dermis_write_poses` says
   dermis_promise promise;
 } dermis_pose_desc;
 // Adds `count` poses of the same description, all of identities until they are written. If it
@@ -452,11 +451,12 @@ DERMIS_C_API dermis_code dermis_remove_instance(dermis_scene* scene, dermis_inst
 // newest frame that the GPU has completed, or 0; on the CPU, the frame before is complete.
 DERMIS_C_API dermis_code dermis_begin_frame(dermis_scene* scene, uint64_t frame,
                                             uint64_t completed_frame, dermis_error* error);
-// Returns memory for the joint matrices of a pose in this frame, or null if it fails. The engine
-// writes all of it before the frame is executed, on any thread, and never reads it. `joint_count`
-// may be null.
-DERMIS_C_API dermis_joint* dermis_write_pose(dermis_scene* scene, dermis_pose pose,
-                                             uint32_t* joint_count, dermis_error* error);
+// Gets memory for the joint matrices of poses in this frame. The engine writes all of it before the
+// frame is executed, on any thread, and never reads it. `joint_counts` may be null. From the pose
+// that fails on, pointers and counts are 0.
+DERMIS_C_API dermis_code dermis_write_poses(dermis_scene* scene, const dermis_pose* poses,
+                                            uint32_t count, dermis_joint** joints,
+                                            uint32_t* joint_counts, dermis_error* error);
 // States that a GPU pass of the engine writes these poses before the commands of this frame. If
 // one fails, those before it are marked.
 DERMIS_C_API dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses,

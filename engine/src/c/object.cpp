@@ -23,7 +23,7 @@ constexpr std::pair<std::string_view, std::string_view> names[] = {
     {"makePlan", "dermis_make_plan"},
     {"beginFrame", "dermis_begin_frame"},
     {"abandonFrame", "dermis_abandon_frame"},
-    {"writePose", "dermis_write_pose"},
+    {"writePose", "dermis_write_poses"},
     {"markWritten", "dermis_mark_written"},
     {"repair()", "dermis_repair"},
     {"framesInFlight", "frames_in_flight"},

@@ -87,15 +87,20 @@ dermis_code dermis_begin_frame(dermis_scene* scene, uint64_t frame, uint64_t com
   return guarded(error, [&] { must(changedScene(scene).beginFrame(frame, completed_frame)); });
 }
 
-dermis_joint* dermis_write_pose(dermis_scene* scene, dermis_pose pose, uint32_t* joint_count,
-                                dermis_error* error) {
-  dermis_joint* joints = nullptr;
-  guarded(error, [&] {
-    const std::span<JointMatrix> memory = must(changedScene(scene).writePose(handleOf(pose)));
-    if (joint_count != nullptr) *joint_count = static_cast<std::uint32_t>(memory.size());
-    joints = reinterpret_cast<dermis_joint*>(memory.data());
+dermis_code dermis_write_poses(dermis_scene* scene, const dermis_pose* poses, uint32_t count,
+                               dermis_joint** joints, uint32_t* joint_counts, dermis_error* error) {
+  return guarded(error, [&] {
+    Scene& target = changedScene(scene);
+    const std::span<const dermis_pose> handles = array(poses, count, "poses");
+    const std::span<dermis_joint*> results = array(joints, count, "joints");
+    std::ranges::fill(results, nullptr);
+    if (joint_counts != nullptr) std::fill_n(joint_counts, count, 0);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::span<JointMatrix> memory = must(target.writePose(handleOf(handles[i])));
+      results[i] = reinterpret_cast<dermis_joint*>(memory.data());
+      if (joint_counts != nullptr) joint_counts[i] = static_cast<std::uint32_t>(memory.size());
+    }
   });
-  return joints;
 }
 
 dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses, uint32_t count,

@@ -67,8 +67,8 @@ int skin() {
   const float c = std::cos(2.0f), s = std::sin(2.0f);
   const dermis_joint twist[2] = {{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}},
                                  {{{c, 0, s, 0}, {0, 1, 0, 0}, {-s, 0, c, 0}}}};
-  dermis_joint* memory = dermis_write_pose(scene, figure.pose, nullptr, &error);
-  if (memory == nullptr) throw std::runtime_error(error.message);
+  dermis_joint* memory = nullptr;
+  must(dermis_write_poses(scene, &figure.pose, 1, &memory, nullptr, &error));
   std::memcpy(memory, twist, sizeof twist);
   dermis_runner_frame frame{};
   frame.size = sizeof frame;
