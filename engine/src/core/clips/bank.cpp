@@ -1,0 +1,187 @@
+// What a bank is asked, and whether stored bytes are one.
+#include "clips/bank.h"
+
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "dermis/clips.h"
+#include "pack/check.h"
+#include "strict_floating_point.h"
+
+namespace dermis {
+namespace {
+
+Error damaged(const std::string& what) {
+  return {ErrorCode::invalidData, "packed clips: " + what};
+}
+
+class BankCheck {
+ public:
+  explicit BankCheck(std::span<const std::uint32_t> words) : bank_(words), total_(words.size()) {}
+
+  Result<void> run() const {
+    const BankHeader& header = bank_.header;
+    const std::uint64_t nodes = header.nodeCount;
+    if (!isSection(header.nodes, nodes * sizeof(BankNode) / 4) ||
+        !isSection(header.skins, header.skinCount * std::uint64_t{sizeof(BankSkin) / 4}) ||
+        !isSection(header.clips, header.clipCount * std::uint64_t{sizeof(BankClip) / 4}) ||
+        !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
+        header.clipCount > maxClips || header.maskCount > maxMasks)
+      return damaged("its header does not fit its sections");
+    for (std::size_t i = 0; i < nodes; ++i) {
+      if (!isNode(i)) return damaged("node " + std::to_string(i) + " is not valid");
+    }
+    for (std::size_t i = 0; i < header.skinCount; ++i) {
+      if (!isSkin(bank_.skin(i))) return damaged("skin " + std::to_string(i) + " is not valid");
+    }
+    for (std::size_t i = 0; i < header.clipCount; ++i) {
+      if (!isClip(bank_.clip(i))) return damaged("clip " + std::to_string(i) + " is not valid");
+    }
+    return {};
+  }
+
+ private:
+  bool isSection(std::uint64_t offset, std::uint64_t count) const {
+    return offset >= sizeof(BankHeader) / 4 && offset <= total_ && count <= total_ - offset;
+  }
+  bool areFinite(std::uint64_t offset, std::uint64_t count) const {
+    if (!isSection(offset, count)) return false;
+    for (std::uint64_t i = offset; i < offset + count; ++i) {
+      if (!std::isfinite(bank_.number(static_cast<std::size_t>(i)))) return false;
+    }
+    return true;
+  }
+
+  bool isNode(std::size_t index) const {
+    const BankNode node = bank_.node(index);
+    const std::size_t record = bank_.header.nodes + index * sizeof(BankNode) / 4;
+    return (node.parent == noNode || node.parent < index) && areFinite(record + 3, 13) &&
+           (node.fixed == 0 || areFinite(node.fixed, 12));
+  }
+
+  bool isSkin(const BankSkin& skin) const {
+    if (skin.jointCount > maxPoseJoints || !isSection(skin.nodes, skin.jointCount) ||
+        !areFinite(skin.matrices, std::uint64_t{12} * skin.jointCount))
+      return false;
+    for (std::size_t joint = 0; joint < skin.jointCount; ++joint) {
+      const std::uint32_t node = bank_.words[skin.nodes + joint];
+      if (node != noNode && node >= bank_.header.nodeCount) return false;
+    }
+    return true;
+  }
+
+  bool isClass(const BankClass& keys) const {
+    const KeyFormat format = KeyFormat::of(keys.format);
+    const std::uint64_t columns = keys.columnCount, intervals = std::uint64_t{keys.keyCount} - 1;
+    return keys.format < 8 && format.size < 3 && keys.level < 32 && keys.keyCount >= 2 &&
+           columns > 0 && columns < 1u << trackColumnBits && keys.rowHalves % 2 == 0 &&
+           keys.rowHalves >= columns * format.halves() &&
+           isSection(keys.keys, keys.keyCount * std::uint64_t{keys.rowHalves / 2}) &&
+           (format.isRotation || areFinite(keys.ranges, 6 * columns)) &&
+           (keys.jumps == 0 || isSection(keys.jumps, intervals * ((columns + 3) / 4)));
+  }
+
+  bool isTrack(const BankClip& clip, std::uint32_t word, bool isRotation) const {
+    switch (static_cast<TrackKind>(word >> 30)) {
+      case TrackKind::rest:
+        return word == 0;
+      case TrackKind::constant:
+        return areFinite(word & 0x3fffffff, isRotation ? 4 : 3);
+      case TrackKind::animated: {
+        const std::uint32_t number = word >> trackColumnBits & 255;
+        if (number >= clip.classCount) return false;
+        const BankClass keys = bank_.keyClass(clip, number);
+        return KeyFormat::of(keys.format).isRotation == isRotation &&
+               (word & ((1u << trackColumnBits) - 1)) < keys.columnCount;
+      }
+    }
+    return false;
+  }
+
+  bool isClip(const BankClip& clip) const {
+    const std::uint64_t tracks = std::uint64_t{3} * bank_.header.nodeCount;
+    if (!std::isfinite(clip.duration) || clip.duration < 0 || !std::isfinite(clip.rate) ||
+        clip.rate < 0 || clip.flags > 3 || clip.classCount > 256 ||
+        !std::isfinite(clip.duration * clip.rate) ||
+        !isSection(clip.classes, clip.classCount * std::uint64_t{sizeof(BankClass) / 4}) ||
+        !isSection(clip.tracks, tracks))
+      return false;
+    for (std::size_t i = 0; i < clip.classCount; ++i) {
+      if (!isClass(bank_.keyClass(clip, i))) return false;
+    }
+    for (std::size_t i = 0; i < tracks; ++i) {
+      if (!isTrack(clip, bank_.words[clip.tracks + i], i % 3 == 1)) return false;
+    }
+    return true;
+  }
+
+  ClipBank bank_;
+  std::uint64_t total_;
+};
+
+}  // namespace
+
+Result<void> checkClips(std::span<const std::uint32_t> words) {
+  if (words.size() < sizeof(BankHeader) / 4 || words[0] != clipsMagic)
+    return damaged("the bytes do not begin with the header of packed clips");
+  const BankHeader header = ClipBank(words).header;
+  if (header.version != clipsVersion) {
+    return Error{ErrorCode::unsupportedVersion,
+                 "packed clips: version " + std::to_string(header.version) +
+                     ", but this library reads version " + std::to_string(clipsVersion)};
+  }
+  if (header.wordCount != words.size()) {
+    return damaged("they have " + std::to_string(words.size() * 4) +
+                   " bytes, but their header says " +
+                   std::to_string(std::uint64_t{header.wordCount} * 4));
+  }
+  if (checksumOfBlob(words) != header.checksum) return damaged("the checksum does not match");
+  return BankCheck(words).run();
+}
+
+Result<PackedClips> PackedClips::fromBytes(std::span<const std::byte> bytes) {
+  PackedClips clips;
+  clips.words_.resize(bytes.size() / 4);
+  if (!clips.words_.empty())
+    std::memcpy(clips.words_.data(), bytes.data(), clips.words_.size() * 4);
+  if (bytes.size() % 4 != 0)
+    return damaged("they have " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
+  if (Result<void> good = checkClips(clips.words_); !good) return good.error();
+  return clips;
+}
+
+std::uint32_t PackedClips::nodeCount() const {
+  return ClipBank(*this).header.nodeCount;
+}
+std::uint32_t PackedClips::skinCount() const {
+  return ClipBank(*this).header.skinCount;
+}
+std::uint32_t PackedClips::clipCount() const {
+  return ClipBank(*this).header.clipCount;
+}
+std::uint32_t PackedClips::maskCount() const {
+  return ClipBank(*this).header.maskCount;
+}
+
+std::uint32_t PackedClips::jointCount(std::uint32_t skin) const {
+  const ClipBank bank(*this);
+  return skin < bank.header.skinCount ? bank.skin(skin).jointCount : 0;
+}
+
+ClipInfo PackedClips::clip(std::uint32_t number) const {
+  const ClipBank bank(*this);
+  if (number >= bank.header.clipCount) return {};
+  const BankClip clip = bank.clip(number);
+  return {clip.duration, (clip.flags & 1) != 0, (clip.flags & 2) != 0};
+}
+
+ClipError PackedClips::error(std::uint32_t node) const {
+  const ClipBank bank(*this);
+  for (std::size_t i = 0; i < bank.header.nodeCount; ++i) {
+    if (bank.node(i).source == node) return bank.node(i).error;
+  }
+  return {};
+}
+
+}  // namespace dermis

@@ -1,0 +1,159 @@
+#include "clips/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "strict_floating_point.h"
+#include "text.h"
+
+namespace dermis {
+namespace {
+
+Error invalid(const std::string& what) {
+  return {ErrorCode::invalidArgument, "packClips: " + what};
+}
+
+Error exceeded(const std::string& what) {
+  return {ErrorCode::limitExceeded, "packClips: " + what};
+}
+
+template <typename Numbers>
+bool areFinite(const Numbers& numbers) {
+  return std::ranges::all_of(numbers, [](auto number) { return std::isfinite(number); });
+}
+
+Result<void> checkNodes(const std::vector<SkeletonNode>& nodes) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const SkeletonNode& node = nodes[i];
+    const std::string title = titled("node", i, node.name);
+    bool isFinite =
+        areFinite(node.translation) && areFinite(node.rotation) && areFinite(node.scale);
+    if (node.matrix)
+      isFinite = isFinite && std::ranges::all_of(*node.matrix, areFinite<std::array<double, 4>>);
+    if (!isFinite) return invalid(title + " has a number that is not finite");
+    if (std::ranges::all_of(node.rotation, [](double number) { return number == 0; }))
+      return invalid(title + " has the rotation 0");
+    // No chain without a cycle is longer than the number of nodes.
+    std::size_t above = i;
+    for (std::size_t step = 0; above < nodes.size(); ++step) {
+      if (step > nodes.size()) return invalid(title + " is its own ancestor");
+      above = nodes[above].parent;
+    }
+  }
+  return {};
+}
+
+Result<void> checkSkins(const Skeleton& skeleton) {
+  if (skeleton.skins.empty()) return invalid("there are no skins");
+  for (std::size_t i = 0; i < skeleton.skins.size(); ++i) {
+    const SkeletonSkin& skin = skeleton.skins[i];
+    const std::string title = titled("skin", i, skin.name);
+    if (skin.joints.size() > maxPoseJoints)
+      return exceeded(title + " has " + std::to_string(skin.joints.size()) + " joints");
+    if (skin.joints.size() != skin.inverseBind.size()) {
+      return invalid(title + " has " + std::to_string(skin.joints.size()) + " joints, but " +
+                     std::to_string(skin.inverseBind.size()) + " inverse bind matrices");
+    }
+    for (std::size_t joint = 0; joint < skin.joints.size(); ++joint) {
+      if (skin.joints[joint] >= skeleton.nodes.size()) {
+        return invalid(title + ": joint " + std::to_string(joint) + " is node " +
+                       std::to_string(skin.joints[joint]) + ", which does not exist");
+      }
+      for (const auto& row : skin.inverseBind[joint].m) {
+        if (!areFinite(row)) {
+          return invalid(title + ": the inverse bind matrix of joint " + std::to_string(joint) +
+                         " has a number that is not finite");
+        }
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> checkChannel(const Skeleton& skeleton, const ChannelView& channel,
+                          const std::string& clip) {
+  if (channel.node >= skeleton.nodes.size()) {
+    return invalid(clip + " animates node " + std::to_string(channel.node) +
+                   ", which does not exist");
+  }
+  const SkeletonNode& node = skeleton.nodes[channel.node];
+  const std::string title = clip + ": " + titled("node", channel.node, node.name);
+  if (channel.path > ChannelPath::weights || channel.interpolation > Interpolation::cubicSpline)
+    return invalid(title + ": the path or the interpolation is no value of its type");
+  if (channel.path == ChannelPath::weights) return {};
+  if (node.matrix) return invalid(title + " has a matrix, so it cannot be animated");
+  const std::size_t width = (channel.path == ChannelPath::rotation ? 4u : 3u) *
+                            (channel.interpolation == Interpolation::cubicSpline ? 3u : 1u);
+  if (channel.times.empty() || channel.values.size() != channel.times.size() * width) {
+    return invalid(title + " has " + std::to_string(channel.times.size()) + " key times and " +
+                   std::to_string(channel.values.size()) + " numbers: " + std::to_string(width) +
+                   " are needed for each of at least one key");
+  }
+  if (!areFinite(channel.times) || !areFinite(channel.values))
+    return invalid(title + " has a key that is not finite");
+  if (!std::ranges::is_sorted(channel.times)) return invalid(title + ": its key times descend");
+  return {};
+}
+
+Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clips) {
+  if (clips.size() > maxClips) {
+    return exceeded("there are " + std::to_string(clips.size()) + " clips, but at most " +
+                    std::to_string(maxClips) + " are allowed");
+  }
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    const ClipView& clip = clips[i];
+    const std::string title = titled("clip", i, clip.name);
+    if (!std::isfinite(clip.duration) || clip.duration < 0 ||
+        !std::isfinite(static_cast<float>(clip.duration)))
+      return invalid(title + ": its duration is not finite, or negative");
+    std::set<std::pair<std::uint32_t, ChannelPath>> seen;
+    for (const ChannelView& channel : clip.channels) {
+      if (Result<void> good = checkChannel(skeleton, channel, title); !good) return good;
+      if (channel.path != ChannelPath::weights && !seen.insert({channel.node, channel.path}).second)
+        return invalid(title + " has two channels for one property of " +
+                       titled("node", channel.node, skeleton.nodes[channel.node].name));
+    }
+    if (!clip.additive || clip.baseClip >= clips.size()) continue;
+    if (clip.baseClip == i || clips[clip.baseClip].additive)
+      return invalid(title + ": its base is itself, or additive");
+    if (!std::isfinite(clip.baseTime)) return invalid(title + ": its base time is not finite");
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string titled(const char* kind, std::size_t number, std::string_view name) {
+  std::string title = kind;
+  title.append(" ").append(std::to_string(number));
+  return name.empty() ? title : title.append(" ").append(inQuotes(name));
+}
+
+Result<void> checkClipInput(const Skeleton& skeleton, std::span<const ClipView> clips,
+                            const PackClipsOptions& options) {
+  if (!std::isfinite(options.maxError) || options.maxError < 0)
+    return invalid("maxError is not finite, or negative");
+  if (Result<void> good = checkNodes(skeleton.nodes); !good) return good;
+  if (Result<void> good = checkSkins(skeleton); !good) return good;
+  if (!options.meshes.empty() && options.meshes.size() != skeleton.skins.size()) {
+    return invalid("there are " + std::to_string(options.meshes.size()) + " meshes, but " +
+                   std::to_string(skeleton.skins.size()) + " skins");
+  }
+  if (std::ranges::count(options.meshes, nullptr) > 0) return invalid("a mesh is null");
+  if (options.masks.size() > maxMasks) {
+    return exceeded("there are " + std::to_string(options.masks.size()) + " masks, but at most " +
+                    std::to_string(maxMasks) + " are allowed");
+  }
+  for (std::size_t i = 0; i < options.masks.size(); ++i) {
+    if (options.masks[i].size() != skeleton.nodes.size() ||
+        !std::ranges::all_of(options.masks[i], [](float x) { return x >= 0 && x <= 1; })) {
+      return invalid("mask " + std::to_string(i + 1) +
+                     " does not have a factor from 0 to 1 for each node");
+    }
+  }
+  return checkClips(skeleton, clips);
+}
+
+}  // namespace dermis

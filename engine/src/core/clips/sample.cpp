@@ -1,0 +1,279 @@
+// Samples poses of a bank in float32, operation by operation, so that every processor gets the same
+// bits.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "clips/bank.h"
+#include "dermis/clips.h"
+#include "strict_floating_point.h"
+
+namespace dermis {
+namespace {
+
+using Float4 = std::array<float, 4>;
+
+struct Local {
+  Float4 translation, rotation, scale;
+};
+
+/// A layer whose time is inside its clip.
+struct Layer {
+  BankClip clip;
+  float time, weight;
+  std::uint32_t mask;
+};
+
+float dot(const Float4& a, const Float4& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
+
+Float4 normalized(const Float4& q) {
+  const float squared = dot(q, q);
+  if (!(squared > 0)) return {0, 0, 0, 1};
+  const float length = std::sqrt(squared);
+  return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
+}
+
+Float4 mix(const Float4& a, float share, const Float4& b, float other) {
+  Float4 result;
+  for (std::size_t i = 0; i < 4; ++i) result[i] = share * a[i] + other * b[i];
+  return result;
+}
+
+/// Three numbers of a record.
+Float4 vectorFrom(const float (&numbers)[3]) {
+  return {numbers[0], numbers[1], numbers[2], 0};
+}
+
+/// Samples a track with keys.
+Float4 sampleKeys(const ClipBank& bank, const Layer& layer, std::uint32_t word) {
+  const std::uint32_t column = word & ((1u << trackColumnBits) - 1);
+  const BankClass keys = bank.keyClass(layer.clip, word >> trackColumnBits & 255);
+  const KeyFormat format = KeyFormat::of(keys.format);
+  const float position =
+      layer.time * layer.clip.rate * (1.0f / static_cast<float>(1u << keys.level));
+  const float last = static_cast<float>(keys.keyCount - 2);
+  const float interval = std::min(std::floor(position), last);
+  float fraction = position - interval;
+  const auto row = static_cast<std::size_t>(interval);
+  if (keys.jumps != 0) {
+    const std::size_t rowWords = (keys.columnCount + 3) / 4;
+    const std::uint32_t jump =
+        bank.words[keys.jumps + row * rowWords + column / 4] >> (column % 4 * 8) & 255;
+    // The jump is at (jump + 1) / 256.
+    if (jump != 0) fraction = fraction * 256 >= static_cast<float>(jump + 1) ? 1.0f : 0.0f;
+  }
+  const std::size_t half =
+      2 * std::size_t{keys.keys} + row * keys.rowHalves + column * format.halves();
+  const KeyBits from = readKey(bank.words, half, format);
+  const KeyBits to = readKey(bank.words, half + keys.rowHalves, format);
+  if (format.isRotation) {
+    const Float4 a = rotationOf(from, format), b = rotationOf(to, format);
+    return normalized(mix(a, 1 - fraction, b, dot(a, b) < 0 ? -fraction : fraction));
+  }
+  std::array<float, 6> range;
+  std::memcpy(range.data(), &bank.words[keys.ranges + 6 * column], sizeof(range));
+  return mix(vectorOf(from, range), 1 - fraction, vectorOf(to, range), fraction);
+}
+
+Float4 sampleTrack(const ClipBank& bank, const Layer& layer, std::size_t node, ChannelPath path,
+                   const Float4& rest) {
+  const std::uint32_t word =
+      bank.words[layer.clip.tracks + 3 * node + static_cast<std::size_t>(path)];
+  switch (static_cast<TrackKind>(word >> 30)) {
+    case TrackKind::rest:
+      return rest;
+    case TrackKind::constant: {
+      Float4 value{};
+      const std::size_t offset = word & 0x3fffffff;
+      for (std::size_t i = 0; i < (path == ChannelPath::rotation ? 4u : 3u); ++i)
+        value[i] = bank.number(offset + i);
+      return value;
+    }
+    case TrackKind::animated:
+      break;
+  }
+  return sampleKeys(bank, layer, word);
+}
+
+Local sampleLocal(const ClipBank& bank, const Layer& layer, std::size_t node, const Local& rest) {
+  return {sampleTrack(bank, layer, node, ChannelPath::translation, rest.translation),
+          sampleTrack(bank, layer, node, ChannelPath::rotation, rest.rotation),
+          sampleTrack(bank, layer, node, ChannelPath::scale, rest.scale)};
+}
+
+bool isAdditive(const Layer& layer) {
+  return (layer.clip.flags & 2) != 0;
+}
+
+/// The weighted mean of the layers that are not additive.
+Local blend(const ClipBank& bank, std::span<const Layer> layers, std::size_t node,
+            const Local& rest) {
+  float sum = 0;
+  for (const Layer& layer : layers) {
+    if (!isAdditive(layer)) sum = sum + layer.weight * bank.mask(layer.mask, node);
+  }
+  if (!(sum > 0)) return rest;
+  Local result{};
+  Float4 first{};
+  bool isFirst = true;
+  for (const Layer& layer : layers) {
+    if (isAdditive(layer)) continue;
+    const float weight = layer.weight * bank.mask(layer.mask, node);
+    if (!(weight > 0)) continue;
+    const float share = weight / sum;
+    const Local local = sampleLocal(bank, layer, node, rest);
+    if (isFirst) first = local.rotation;
+    isFirst = false;
+    result.translation = mix(result.translation, 1, local.translation, share);
+    result.scale = mix(result.scale, 1, local.scale, share);
+    result.rotation =
+        mix(result.rotation, 1, local.rotation, dot(first, local.rotation) < 0 ? -share : share);
+  }
+  result.rotation = normalized(result.rotation);
+  return result;
+}
+
+constexpr Local noDifference{{0, 0, 0, 0}, {0, 0, 0, 1}, {1, 1, 1, 0}};
+
+void add(Local& local, const Local& difference, float weight) {
+  Float4 turn = difference.rotation;
+  if (turn[3] < 0) turn = mix(turn, -1, {}, 0);
+  turn = normalized(mix({0, 0, 0, 1}, 1 - weight, turn, weight));
+  const Float4 q = local.rotation;
+  local.rotation = normalized({q[3] * turn[0] + q[0] * turn[3] + q[1] * turn[2] - q[2] * turn[1],
+                               q[3] * turn[1] - q[0] * turn[2] + q[1] * turn[3] + q[2] * turn[0],
+                               q[3] * turn[2] + q[0] * turn[1] - q[1] * turn[0] + q[2] * turn[3],
+                               q[3] * turn[3] - q[0] * turn[0] - q[1] * turn[1] - q[2] * turn[2]});
+  for (std::size_t i = 0; i < 3; ++i) {
+    local.translation[i] = local.translation[i] + weight * difference.translation[i];
+    local.scale[i] = local.scale[i] * (1 + weight * (difference.scale[i] - 1));
+  }
+}
+
+JointMatrix matrixOf(const Local& local) {
+  const auto& [x, y, z, w] = local.rotation;
+  const Float4 &s = local.scale, &t = local.translation;
+  return {{{(1 - 2 * (y * y + z * z)) * s[0], 2 * (x * y - w * z) * s[1],
+            2 * (x * z + w * y) * s[2], t[0]},
+           {2 * (x * y + w * z) * s[0], (1 - 2 * (x * x + z * z)) * s[1],
+            2 * (y * z - w * x) * s[2], t[1]},
+           {2 * (x * z - w * y) * s[0], 2 * (y * z + w * x) * s[1],
+            (1 - 2 * (x * x + y * y)) * s[2], t[2]}}};
+}
+
+JointMatrix product(const JointMatrix& a, const JointMatrix& b) {
+  JointMatrix result;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      result.m[row][column] = a.m[row][0] * b.m[0][column] + a.m[row][1] * b.m[1][column] +
+                              a.m[row][2] * b.m[2][column] + (column == 3 ? a.m[row][3] : 0.0f);
+    }
+  }
+  return result;
+}
+
+/// The nearest float16, as float32; infinite above its range. Ties go to the even one.
+float roundedToHalf(float value) {
+  if (!(std::abs(value) < 65520))
+    return std::copysign(std::numeric_limits<float>::infinity(), value);
+  const int exponent = std::max(std::ilogb(value == 0 ? 1.0f : value), -14);
+  const float step = std::ldexp(1.0f, exponent - 10);
+  return std::nearbyint(value / step) * step;
+}
+
+Error refused(std::size_t layer, const std::string& what) {
+  return {ErrorCode::invalidArgument, "samplePose: layer " + std::to_string(layer) + ": " + what};
+}
+
+Result<std::vector<Layer>> resolve(const PackedClips& clips, const ClipBank& bank,
+                                   std::span<const ClipLayer> layers) {
+  if (layers.size() > maxClipLayers) {
+    return Error{ErrorCode::invalidArgument,
+                 "samplePose: there are " + std::to_string(layers.size()) +
+                     " layers, but at most " + std::to_string(maxClipLayers) + " are allowed"};
+  }
+  std::vector<Layer> result;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const ClipLayer& layer = layers[i];
+    if (layer.clip >= bank.header.clipCount) {
+      return refused(i, "there is no clip " + std::to_string(layer.clip) + "; the bank has " +
+                            std::to_string(bank.header.clipCount));
+    }
+    if (layer.mask > bank.header.maskCount) {
+      return refused(i, "there is no mask " + std::to_string(layer.mask) + "; the bank has " +
+                            std::to_string(bank.header.maskCount));
+    }
+    if (!std::isfinite(layer.time)) return refused(i, "its time is not finite");
+    if (!std::isfinite(layer.weight)) return refused(i, "its weight is not finite");
+    const float weight = roundedToHalf(layer.weight);
+    if (!std::isfinite(weight)) return refused(i, "its weight is too large for float16");
+    const ClipInfo info = clips.clip(layer.clip);
+    if (weight < 0 && !info.additive)
+      return refused(i, "its weight is negative, and its clip is not additive");
+    result.push_back(
+        {bank.clip(layer.clip), clipTime(info, layer.time, layer.hold), weight, layer.mask});
+  }
+  return result;
+}
+
+}  // namespace
+
+float clipTime(const ClipInfo& info, double seconds, bool hold) {
+  const double duration = double{info.duration};
+  if (!(duration > 0)) return 0;
+  double time = seconds;
+  if (info.wraps && !hold) {
+    time = std::fmod(seconds, duration);
+    if (time < 0) time += duration;
+  }
+  return static_cast<float>(std::clamp(time, 0.0, duration));
+}
+
+Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> layers,
+                        std::uint32_t skinNumber, std::span<JointMatrix> pose) {
+  const ClipBank bank(clips);
+  if (skinNumber >= bank.header.skinCount) {
+    return Error{ErrorCode::invalidArgument, "samplePose: there is no skin " +
+                                                 std::to_string(skinNumber) + "; the bank has " +
+                                                 std::to_string(bank.header.skinCount)};
+  }
+  const BankSkin skin = bank.skin(skinNumber);
+  if (pose.size() != skin.jointCount) {
+    return Error{ErrorCode::invalidArgument,
+                 "samplePose: the pose has " + std::to_string(pose.size()) + " joints, but skin " +
+                     std::to_string(skinNumber) + " has " + std::to_string(skin.jointCount)};
+  }
+  const Result<std::vector<Layer>> resolved = resolve(clips, bank, layers);
+  if (!resolved) return resolved.error();
+
+  std::vector<JointMatrix> globals(bank.header.nodeCount);
+  for (std::size_t i = 0; i < globals.size(); ++i) {
+    const BankNode node = bank.node(i);
+    const Local rest{vectorFrom(node.translation),
+                     {node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]},
+                     vectorFrom(node.scale)};
+    Local local = blend(bank, *resolved, i, rest);
+    for (const Layer& layer : *resolved) {
+      if (isAdditive(layer)) {
+        add(local, sampleLocal(bank, layer, i, noDifference),
+            layer.weight * bank.mask(layer.mask, i));
+      }
+    }
+    JointMatrix matrix = matrixOf(local);
+    if (node.fixed != 0) matrix = product(bank.at<JointMatrix>(node.fixed), matrix);
+    globals[i] = node.parent == noNode ? matrix : product(globals[node.parent], matrix);
+  }
+  for (std::size_t joint = 0; joint < pose.size(); ++joint) {
+    const auto matrix = bank.at<JointMatrix>(skin.matrices + 12 * joint);
+    const std::uint32_t node = bank.words[skin.nodes + joint];
+    pose[joint] = node == noNode ? matrix : product(globals[node], matrix);
+  }
+  return {};
+}
+
+}  // namespace dermis
