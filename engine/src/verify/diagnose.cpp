@@ -24,7 +24,7 @@ using diagnosis::Hypothesis;
 using diagnosis::Pose;
 using diagnosis::PoseProbe;
 using diagnosis::PoseScore;
-using diagnosis::Skeleton;
+using diagnosis::PoseSkeleton;
 
 /// Poses are equal if no vertex differs by more, in sizes of the posed mesh.
 constexpr double sameVertex = 0.01;
@@ -146,7 +146,7 @@ std::vector<InfluenceSet> reorderedSets(const MeshView& mesh, std::span<const st
   return sets;
 }
 
-void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleton& skeleton,
+void offerWeightSets(const MeshView& mesh, const PoseInput& input, const PoseSkeleton& skeleton,
                      const Pose& pose, const PoseScore& wrong, Mended& mended) {
   const std::size_t count = mesh.influenceSets.size();
   for (std::size_t a = 0; a < count; ++a) {
@@ -170,7 +170,7 @@ void offerWeightSets(const MeshView& mesh, const PoseInput& input, const Skeleto
   }
 }
 
-Mended findMend(const MeshView& mesh, const PoseInput& input, const Skeleton& skeleton,
+Mended findMend(const MeshView& mesh, const PoseInput& input, const PoseSkeleton& skeleton,
                 const PoseProbe& probe, const std::vector<Hypothesis>& hypotheses, const Pose& pose,
                 const PoseScore& wrong, bool consistent) {
   Mended mended;
@@ -249,7 +249,7 @@ const char* poseMistakeName(PoseMistake mistake) {
 
 Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
   if (const Result<void> valid = checkInput(mesh, input); !valid) return valid.error();
-  const Result<Skeleton> skeleton = diagnosis::skeletonOf(input);
+  const Result<PoseSkeleton> skeleton = diagnosis::skeletonOf(input);
   if (!skeleton) return skeleton.error();
 
   Diagnosis result;

@@ -21,7 +21,7 @@ using glm::dvec3;
 using Change = Hypothesis::Change;
 
 /// The nodes from a root to this one.
-std::vector<std::uint32_t> pathTo(const Skeleton& skeleton, std::uint32_t node) {
+std::vector<std::uint32_t> pathTo(const PoseSkeleton& skeleton, std::uint32_t node) {
   std::vector<std::uint32_t> path;
   for (; node != noJoint; node = skeleton.nodeParents[node]) path.push_back(node);
   std::ranges::reverse(path);
@@ -29,7 +29,7 @@ std::vector<std::uint32_t> pathTo(const Skeleton& skeleton, std::uint32_t node) 
 }
 
 /// The nodes above all joints, from the root on, and the joint that is above all others.
-std::vector<std::uint32_t> commonPath(const Skeleton& skeleton) {
+std::vector<std::uint32_t> commonPath(const PoseSkeleton& skeleton) {
   std::vector<std::uint32_t> common = pathTo(skeleton, skeleton.nodeOfJoint[0]);
   for (const std::uint32_t node : skeleton.nodeOfJoint) {
     const std::vector<std::uint32_t> path = pathTo(skeleton, node);
@@ -52,7 +52,8 @@ Pose inverses(const Pose& pose) {
 }
 
 /// The pose in which joints that have no matrix move with their parents.
-std::optional<Pose> completed(std::vector<std::optional<Affine>> found, const Skeleton& skeleton) {
+std::optional<Pose> completed(std::vector<std::optional<Affine>> found,
+                              const PoseSkeleton& skeleton) {
   Pose pose(found.size());
   for (std::size_t joint = 0; joint < found.size(); ++joint) {
     auto from = static_cast<std::uint32_t>(joint);
@@ -85,7 +86,7 @@ Affine reordered(const Affine& local, const std::array<int, 4>& order) {
 
 /// Transposed back. Translations are lost: they are chosen so that each joint is where its parent
 /// takes it.
-std::optional<Pose> transposedBack(const Skeleton& skeleton, const Pose& pose) {
+std::optional<Pose> transposedBack(const PoseSkeleton& skeleton, const Pose& pose) {
   Pose result;
   bool moved = false;
   for (const Affine& a : pose) {
@@ -110,7 +111,7 @@ std::optional<Pose> transposedBack(const Skeleton& skeleton, const Pose& pose) {
 
 /// With other rotations of all nodes. If local transforms are not known, they are computed from
 /// the pose.
-std::optional<Pose> withOrder(const Skeleton& skeleton, const Pose& pose,
+std::optional<Pose> withOrder(const PoseSkeleton& skeleton, const Pose& pose,
                               const std::array<int, 4>& order) {
   const Pose& bind = skeleton.bind.inverseBind;
   if (skeleton.hasLocals()) {
@@ -135,7 +136,7 @@ std::optional<Pose> withOrder(const Skeleton& skeleton, const Pose& pose,
 
 class Builder {
  public:
-  explicit Builder(const Skeleton& skeleton) : skeleton_(skeleton) {}
+  explicit Builder(const PoseSkeleton& skeleton) : skeleton_(skeleton) {}
 
   std::vector<Hypothesis> build() {
     addTransposed();
@@ -449,13 +450,13 @@ class Builder {
         [=, &skeleton = skeleton_](const Pose& pose) { return withOrder(skeleton, pose, wFirst); });
   }
 
-  const Skeleton& skeleton_;
+  const PoseSkeleton& skeleton_;
   std::vector<Hypothesis> hypotheses_;
 };
 
 }  // namespace
 
-std::vector<Hypothesis> hypothesesFor(const Skeleton& skeleton) {
+std::vector<Hypothesis> hypothesesFor(const PoseSkeleton& skeleton) {
   return Builder(skeleton).build();
 }
 

@@ -26,7 +26,7 @@ struct Hypothesis {
 };
 
 /// All that can be tested with this skeleton. Those that are more likely come first.
-std::vector<Hypothesis> hypothesesFor(const Skeleton& skeleton);
+std::vector<Hypothesis> hypothesesFor(const PoseSkeleton& skeleton);
 
 /// What is not, and why.
 std::vector<std::pair<PoseMistake, std::string>> untested(const PoseInput& input,

@@ -14,7 +14,8 @@ Error refused(std::string message) {
   return {ErrorCode::invalidArgument, std::move(message)};
 }
 
-/// The nodes, parents first. Empty if they form a cycle.
+}  // namespace
+
 std::vector<std::uint32_t> orderOf(const std::vector<std::uint32_t>& parents) {
   std::vector<std::vector<std::uint32_t>> children(parents.size());
   std::vector<std::uint32_t> order;
@@ -31,9 +32,7 @@ std::vector<std::uint32_t> orderOf(const std::vector<std::uint32_t>& parents) {
   return order;
 }
 
-}  // namespace
-
-Result<Skeleton> skeletonOf(const PoseInput& input) {
+Result<PoseSkeleton> skeletonOf(const PoseInput& input) {
   const std::size_t count = input.jointMatrices.size();
   const auto isFor = [count](const char* name, std::size_t size) -> Result<void> {
     if (size == 0 || size == count) return {};
@@ -52,7 +51,7 @@ Result<Skeleton> skeletonOf(const PoseInput& input) {
                    std::to_string(input.localTransforms.size()) + " elements and parents " +
                    std::to_string(nodes) + "; both have one for each node");
   }
-  Skeleton skeleton;
+  PoseSkeleton skeleton;
   skeleton.nodeOfJoint.assign(input.jointNodes.begin(), input.jointNodes.end());
   if (skeleton.nodeOfJoint.empty()) {
     skeleton.nodeOfJoint.resize(count);
@@ -86,7 +85,7 @@ Result<Skeleton> skeletonOf(const PoseInput& input) {
   return skeleton;
 }
 
-Pose globalsOf(const Skeleton& skeleton, const Pose& locals) {
+Pose globalsOf(const PoseSkeleton& skeleton, const Pose& locals) {
   Pose globals = locals;
   for (const std::uint32_t node : skeleton.nodeOrder) {
     const std::uint32_t parent = skeleton.nodeParents[node];
@@ -95,7 +94,7 @@ Pose globalsOf(const Skeleton& skeleton, const Pose& locals) {
   return globals;
 }
 
-Pose rebuild(const Skeleton& skeleton, const Pose& globals) {
+Pose rebuild(const PoseSkeleton& skeleton, const Pose& globals) {
   Pose pose;
   for (std::size_t joint = 0; joint < skeleton.nodeOfJoint.size(); ++joint)
     pose.push_back(globals[skeleton.nodeOfJoint[joint]] * skeleton.bind.inverseBind[joint]);

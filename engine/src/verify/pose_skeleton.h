@@ -12,7 +12,7 @@
 namespace dermis::diagnosis {
 
 /// The skeleton of a `PoseInput` in double precision.
-struct Skeleton {
+struct PoseSkeleton {
   BindSkeleton bind;
   std::vector<std::uint32_t> nodeOfJoint;
   std::vector<std::uint32_t> nodeParents;  ///< `noJoint` for roots; empty if not known
@@ -25,12 +25,15 @@ struct Skeleton {
   bool isComplete() const { return hasLocals() && !bind.inverseBind.empty(); }
 };
 
+/// The nodes, parents first. Roots have the parent `noJoint`. Empty if parents form a cycle.
+std::vector<std::uint32_t> orderOf(const std::vector<std::uint32_t>& parents);
+
 /// Fails as `diagnose` does.
-Result<Skeleton> skeletonOf(const PoseInput& input);
+Result<PoseSkeleton> skeletonOf(const PoseInput& input);
 
 /// The global transforms of all nodes.
-Pose globalsOf(const Skeleton& skeleton, const Pose& locals);
+Pose globalsOf(const PoseSkeleton& skeleton, const Pose& locals);
 /// The right pose: needs a skeleton that is complete.
-Pose rebuild(const Skeleton& skeleton, const Pose& globals);
+Pose rebuild(const PoseSkeleton& skeleton, const Pose& globals);
 
 }  // namespace dermis::diagnosis
