@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
@@ -73,6 +74,32 @@ struct SkinnedMesh {
 /// of rotation that the method needs.
 DERMIS_VERIFY_API Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose,
                                            Method method, std::span<const MorphWeight> morphs = {});
+
+/// What `samplePose` returns.
+struct SampledPose {
+  std::vector<Transform> joints;  ///< joint global transforms × inverse bind matrices
+  /// How near a pose of the bank must be: {A, B} for each joint, or empty if there was no bank. Its
+  /// joint matrix moves a point p of bind space to at most A + B d from where `joints` moves it. d
+  /// is the length of inverse bind matrix × p: how far p is from the joint, in the joint's frame.
+  /// Infinite if the inverse bind matrix is singular.
+  std::vector<std::array<double, 2>> bounds;
+};
+
+/// Samples the pose of a skin from the clips that a bank is made of, as `dermis::samplePose` does
+/// from the bank, but with exact keys and in double precision. Only the weights are rounded to
+/// float16, and the times to float32. A clip has the pose at rest where it has no channel; so has
+/// the base of an additive clip.
+///
+/// `masks` are those of `PackClipsOptions`. The bounds follow from `bank->error`.
+///
+/// Fails with `invalidArgument` as `dermis::samplePose` does, and if an index or a size does not
+/// fit, or parents form a cycle.
+DERMIS_VERIFY_API Result<SampledPose> samplePose(const Skeleton& skeleton,
+                                                 std::span<const ClipView> clips,
+                                                 std::span<const std::span<const float>> masks,
+                                                 std::span<const ClipLayer> layers,
+                                                 std::uint32_t skin,
+                                                 const PackedClips* bank = nullptr);
 
 }  // namespace dermis::reference
 

@@ -1,0 +1,438 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glm/ext/quaternion_common.hpp>
+#include <glm/ext/quaternion_double.hpp>
+#include <glm/ext/quaternion_geometric.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "dermis/clips.h"
+#include "dermis/verify.h"
+#include "strict_floating_point.h"
+#include "verify/joint.h"
+#include "verify/pose_skeleton.h"
+
+namespace dermis::reference {
+namespace {
+
+using diagnosis::noJoint;
+using glm::dmat3;
+using glm::dmat4;
+using glm::dquat;
+using glm::dvec3;
+using glm::dvec4;
+
+constexpr double u = 0x1p-24;  // half the distance from 1 to the next number of float32
+
+// ---- The local transforms of nodes as clips have them.
+
+/// The local transform of a node. The rotation is a unit quaternion.
+struct Local {
+  dvec3 translation{0};
+  dquat rotation{1, 0, 0, 0};  // w first
+  dvec3 scale{1};
+};
+
+dquat toRotation(const dvec4& value) {
+  return glm::normalize(dquat(value.w, value.x, value.y, value.z));
+}
+
+enum class Part : std::size_t { inTangent = 0, value = 1, outTangent = 2 };
+
+dvec4 keyOf(const ChannelView& channel, std::size_t key, Part part) {
+  const glm::length_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+  if (channel.interpolation == Interpolation::cubicSpline)
+    key = 3 * key + static_cast<std::size_t>(part);
+  dvec4 result(0.0);
+  for (glm::length_t i = 0; i < width; ++i) {
+    result[i] =
+        double{channel.values[key * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]};
+  }
+  return result;
+}
+
+/// glTF 2.0, appendix C.
+dvec4 valueAt(const ChannelView& channel, double time) {
+  // The first key after the time. If a time has several keys, the last of them counts from then on.
+  const auto after = std::upper_bound(channel.times.begin(), channel.times.end(), time,
+                                      [](double at, float key) { return at < double{key}; });
+  const auto next = static_cast<std::size_t>(after - channel.times.begin());
+  if (next == 0) return keyOf(channel, 0, Part::value);
+  const dvec4 from = keyOf(channel, next - 1, Part::value);
+  if (next == channel.times.size() || channel.interpolation == Interpolation::step) return from;
+
+  const dvec4 to = keyOf(channel, next, Part::value);
+  const double start = double{channel.times[next - 1]};
+  const double distance = double{channel.times[next]} - start;
+  const double s = (time - start) / distance;
+  if (channel.interpolation == Interpolation::cubicSpline) {
+    const double s2 = s * s, s3 = s2 * s;
+    return (2 * s3 - 3 * s2 + 1) * from + (3 * s2 - 2 * s3) * to +
+           distance * (s3 - 2 * s2 + s) * keyOf(channel, next - 1, Part::outTangent) +
+           distance * (s3 - s2) * keyOf(channel, next, Part::inTangent);
+  }
+  if (channel.path != ChannelPath::rotation) return (1 - s) * from + s * to;
+  const dquat q = glm::slerp(toRotation(from), toRotation(to), s);  // along the shorter arc
+  return {q.x, q.y, q.z, q.w};
+}
+
+Local restOf(const SkeletonNode& node) {
+  const auto& [x, y, z, w] = node.rotation;
+  return {{node.translation[0], node.translation[1], node.translation[2]},
+          toRotation({x, y, z, w}),
+          {node.scale[0], node.scale[1], node.scale[2]}};
+}
+
+/// The local transform that a clip gives a node of the skeleton.
+Local localAt(const Skeleton& skeleton, std::uint32_t node, const ClipView& clip, double time) {
+  Local local = restOf(skeleton.nodes[node]);
+  for (const ChannelView& channel : clip.channels) {
+    if (channel.node != node || channel.path == ChannelPath::weights) continue;
+    const dvec4 found = valueAt(channel, time);
+    if (channel.path == ChannelPath::translation) local.translation = dvec3(found);
+    if (channel.path == ChannelPath::rotation) local.rotation = toRotation(found);
+    if (channel.path == ChannelPath::scale) local.scale = dvec3(found);
+  }
+  return local;
+}
+
+/// What an additive clip adds to `base` to get `local`: base⁻¹ · rotation with w ≥ 0, translation −
+/// base, scale ÷ base. A scale of 0 in the base gives the ratio 1.
+Local differenceOf(const Local& local, const Local& base) {
+  Local result{local.translation - base.translation, glm::conjugate(base.rotation) * local.rotation,
+               dvec3(1.0)};
+  if (result.rotation.w < 0) result.rotation = -result.rotation;
+  for (glm::length_t i = 0; i < 3; ++i)
+    if (base.scale[i] != 0) result.scale[i] = local.scale[i] / base.scale[i];
+  return result;
+}
+
+/// The time inside a clip, as `clipTime` has it.
+double timeInClip(const ClipView& clip, double seconds, bool hold) {
+  const double duration = double{static_cast<float>(clip.duration)};
+  double time = std::min(std::max(seconds, 0.0), duration);
+  if (clip.wraps && !hold && duration > 0) {
+    time = std::fmod(seconds, duration);
+    if (time < 0) time += duration;
+  }
+  return std::min(double{static_cast<float>(time)}, duration);
+}
+
+/// The nearest number of float16, the even one of two. At least 65536 in size if there is none.
+double roundToHalf(double value) {
+  int exponent = 0;
+  std::frexp(value, &exponent);  // |value| < 2^exponent
+  const int lastPlace = std::max(exponent - 11, -24);
+  return std::ldexp(std::nearbyint(std::ldexp(value, -lastPlace)), lastPlace);
+}
+
+// ---- What is refused.
+
+Error refused(std::string message) {
+  return {ErrorCode::invalidArgument, std::move(message)};
+}
+
+Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clips) {
+  for (const ClipView& clip : clips) {
+    for (const ChannelView& channel : clip.channels) {
+      if (channel.path == ChannelPath::weights) continue;
+      const std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+      const std::size_t parts = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
+      if (channel.node >= skeleton.nodes.size() || channel.times.empty() ||
+          channel.values.size() != channel.times.size() * width * parts) {
+        return refused("clip " + std::to_string(&clip - clips.data()) + ": channel " +
+                       std::to_string(&channel - clip.channels.data()) +
+                       " has no keys, values of another number, or a node that does not exist");
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> checkSkin(const Skeleton& skeleton, std::uint32_t skin) {
+  if (skin >= skeleton.skins.size())
+    return refused("skin " + std::to_string(skin) + " does not exist");
+  const SkeletonSkin& checked = skeleton.skins[skin];
+  if (checked.inverseBind.size() != checked.joints.size())
+    return refused("a skin needs one inverse bind matrix for each joint");
+  for (const std::uint32_t joint : checked.joints) {
+    if (joint >= skeleton.nodes.size())
+      return refused("joint " + std::to_string(joint) + " is not a node");
+  }
+  return {};
+}
+
+/// A layer, ready to be sampled.
+struct Layer {
+  const ClipView* clip = nullptr;
+  const ClipView* base = nullptr;  ///< null: the rest pose
+  double time = 0, baseTime = 0;   ///< inside the clips
+  double weight = 0;               ///< of float16
+  const float* mask = nullptr;
+
+  double factor(std::uint32_t node) const {
+    return mask != nullptr ? weight * double{mask[node]} : weight;
+  }
+};
+
+Result<Layer> toLayer(const ClipLayer& from, std::span<const ClipView> clips,
+                      std::span<const std::span<const float>> masks) {
+  if (from.clip >= clips.size())
+    return refused("clip " + std::to_string(from.clip) + " does not exist");
+  if (from.mask > masks.size())
+    return refused("mask " + std::to_string(from.mask) + " does not exist");
+  if (!std::isfinite(from.time)) return refused("the time is not finite");
+  if (!std::isfinite(from.weight)) return refused("the weight is not finite");
+  const ClipView& clip = clips[from.clip];
+  if (from.weight < 0 && !clip.additive)
+    return refused("the weight is negative, but the clip is not additive");
+
+  Layer layer{.clip = &clip, .time = timeInClip(clip, from.time, from.hold)};
+  layer.weight = roundToHalf(double{from.weight});
+  if (std::abs(layer.weight) > 65504) return refused("the weight is too large for float16");
+  if (from.mask > 0) layer.mask = masks[from.mask - 1].data();
+  if (clip.additive && clip.baseClip < clips.size()) {
+    layer.base = &clips[clip.baseClip];
+    layer.baseTime = timeInClip(*layer.base, clip.baseTime, true);
+  }
+  return layer;
+}
+
+// ---- Blending, and how far the bank's local transform may be from it.
+//
+// The sampled parts of the bank are off by the `ClipError` e of the node. A unit quaternion whose
+// rotation is off by the angle a is off by at most a / 2. So Σ w q is off by Σ w a / 2, which turns
+// it by an arc whose sine is at most that, divided by |Σ w q|; its rotation turns by twice the arc.
+// lerp(1, difference, w) is such a sum in which the first part is exact. If errors decide about the
+// hemisphere, the rotation may be any.
+//
+// float32: a weighted mean has at most 11 roundings of each part. 16 u of its parts cover them,
+// also for quaternions, at 2 × 5 roundings. A product of two quaternions and the interpolation
+// before it turn by at most 32 u. So do the conversion of a quaternion to a matrix, whose 9 entries
+// are off by 4 u each, and the length of the quaternion, which is off by 4 u.
+
+struct LocalError {
+  double translation = 0, rotation = 0, scale = 0;
+};
+
+double largestOf(const dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// The angle by which a sum of quaternions turns if its parts are off by `angle` together.
+double turnOf(double angle, const dquat& sum, bool eitherHemisphere) {
+  if (eitherHemisphere) return std::numbers::pi;
+  return 2 * std::asin(std::min(1.0, angle / 2 / glm::length(sum)));
+}
+
+Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer> layers,
+            const ClipError& clipError, LocalError& error) {
+  const double angle = double{clipError.rotation} + 16 * u;
+  Local sum{dvec3(0.0), dquat(0, 0, 0, 0), dvec3(0.0)};
+  dquat first(1, 0, 0, 0);
+  double total = 0, translations = 0, scales = 0;
+  bool eitherHemisphere = false;
+  for (const Layer& layer : layers) {
+    const double factor = layer.factor(node);
+    if (layer.clip->additive || factor == 0) continue;
+    const Local local = localAt(skeleton, node, *layer.clip, layer.time);
+    if (total == 0) first = local.rotation;
+    const double cosine = glm::dot(first, local.rotation);
+    eitherHemisphere |= std::abs(cosine) <= angle;
+    total += factor;
+    sum.translation += factor * local.translation;
+    sum.rotation = sum.rotation + local.rotation * (cosine < 0 ? -factor : factor);
+    sum.scale += factor * local.scale;
+    translations += factor * glm::length(local.translation);
+    scales += factor * largestOf(local.scale);
+  }
+  if (total == 0) {
+    const Local rest = restOf(skeleton.nodes[node]);
+    error = {16 * u * glm::length(rest.translation), 32 * u, 16 * u * largestOf(rest.scale)};
+    return rest;
+  }
+  error.translation = double{clipError.translation} + 16 * u * translations / total;
+  error.rotation = turnOf(total * angle, sum.rotation, eitherHemisphere) + 32 * u;
+  error.scale = double{clipError.scale} + 16 * u * scales / total;
+  return {sum.translation / total, glm::normalize(sum.rotation), sum.scale / total};
+}
+
+void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
+         const ClipError& clipError, Local& local, LocalError& error) {
+  const double factor = layer.factor(node), size = std::abs(factor);
+  if (!layer.clip->additive || factor == 0) return;
+  const Local base = layer.base != nullptr ? localAt(skeleton, node, *layer.base, layer.baseTime)
+                                           : restOf(skeleton.nodes[node]);
+  const Local difference = differenceOf(localAt(skeleton, node, *layer.clip, layer.time), base);
+
+  const double angle = double{clipError.rotation} + 16 * u;
+  const dquat turn = dquat(1 - factor, 0, 0, 0) + difference.rotation * factor;
+  error.rotation += turnOf(size * angle, turn, std::abs(difference.rotation.w) <= angle) + 32 * u;
+  local.rotation = glm::normalize(local.rotation * glm::normalize(turn));
+
+  local.translation += factor * difference.translation;
+  error.translation +=
+      size * double{clipError.translation} +
+      4 * u * (glm::length(local.translation) + size * glm::length(difference.translation));
+
+  const dvec3 growth = 1.0 + factor * (difference.scale - 1.0);
+  const double growthError =
+      size * double{clipError.scale} + 4 * u * (1 + size * largestOf(difference.scale - 1.0));
+  error.scale =
+      error.scale * largestOf(growth) + (largestOf(local.scale) + error.scale) * growthError;
+  local.scale *= growth;
+}
+
+// ---- The skeleton.
+//
+// M_i is the exact local transform of node i, G_i the product of those from the root to i, and ~
+// marks those of the bank. x is a point in the frame of the joint n, y_i = M_i+1 … M_n x. Then
+//
+//     G~_n x − G_n x = Σ G~_i-1 (M~_i − M_i) y_i   without rounding, and
+//     |(M~ − M) y| ≤ translation error + (rotation error · largest scale + scale error) |y|.
+//
+// Nothing is left out: ‖G~_i-1‖ ≤ ‖G_i-1‖ + `drift`, which is the same sum for matrices instead of
+// points. |y_i| ≤ |y_i for x = 0| + ‖M_i+1 … M_n‖ |x|. All norms are spectral.
+//
+// float32: A B y, with 3×4 matrices, is off by 4 u (‖A‖_F ‖B‖_F |y| + ‖A‖_F |B's translation| +
+// |A's translation|), and ‖·‖_F ≤ √3 ‖·‖. With P_i the product of the norms ‖M~‖ from the root to
+// i, and T_i = Σ P_i-1 |translation of M~_i|, this is at most 12 u (P_i |y| + T_i). 16 u of them,
+// once for each node and once for the inverse bind matrix, cover the rounding of factors as well,
+// whichever nodes the bank folds into others.
+
+struct PosedNode {
+  dmat4 local{1.0}, global{1.0};
+  double shift = 0, turn = 0;  ///< |(M~ − M) y| ≤ shift + turn |y|
+  double drift = 0;            ///< ‖G~ − G‖ at most
+  double stretch = 1;          ///< ‖G~‖ at most
+  double product = 1;          ///< P
+  double span = 0;             ///< T
+};
+
+double normOf(const dmat4& matrix) {
+  return singularValues(dmat3(matrix)).values[0];
+}
+
+template <typename Rows>  // of a Transform or a JointMatrix
+dmat4 toMatrix(const Rows& rows) {
+  dmat4 result(1.0);
+  for (glm::length_t row = 0; row < 3; ++row)
+    for (glm::length_t column = 0; column < 4; ++column)
+      result[column][row] =
+          double{rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]};
+  return result;
+}
+
+PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer> layers,
+                   const PosedNode& above, const PackedClips* bank) {
+  PosedNode posed;
+  if (skeleton.nodes[node].matrix) {
+    posed.local = toMatrix(*skeleton.nodes[node].matrix);
+  } else {
+    const ClipError clipError = bank != nullptr ? bank->error(node) : ClipError{};
+    LocalError error;
+    Local local = blend(skeleton, node, layers, clipError, error);
+    for (const Layer& layer : layers) add(skeleton, node, layer, clipError, local, error);
+    posed.local = dmat4(glm::mat3_cast(local.rotation));
+    for (glm::length_t i = 0; i < 3; ++i) posed.local[i] *= local.scale[i];
+    posed.local[3] = {local.translation, 1};
+    posed.shift = error.translation;
+    posed.turn = error.rotation * largestOf(local.scale) + error.scale;
+  }
+  posed.global = above.global * posed.local;
+  if (bank == nullptr) return posed;
+  const double norm = normOf(posed.local);
+  posed.product = above.product * (norm + posed.turn);
+  posed.span = above.span + above.product * (glm::length(dvec3(posed.local[3])) + posed.shift);
+  posed.drift = above.drift * norm + above.stretch * posed.turn + 16 * u * posed.product;
+  posed.stretch = normOf(posed.global) + posed.drift;
+  return posed;
+}
+
+std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
+                              std::span<const std::uint32_t> parents, std::uint32_t joint,
+                              const dmat4& inverseBind) {
+  // p = L⁻¹ (x − t), with L the linear part of the inverse bind matrix and t its translation.
+  const dvec3 values = singularValues(dmat3(inverseBind)).values;
+  const double infinite = std::numeric_limits<double>::infinity();
+  if (values[2] == 0) return {infinite, infinite};
+  const dvec3 t(inverseBind[3]);
+  const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
+  const PosedNode& last = nodes[joint];
+  double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span);
+  double perDistance = 16 * u * last.product * values[0] / values[2];
+
+  dmat4 below(1.0);  // from the frame of the joint
+  for (std::uint32_t node = joint; node != noJoint; node = parents[node]) {
+    const PosedNode& posed = nodes[node];
+    const double stretch = parents[node] != noJoint ? nodes[parents[node]].stretch : 1;
+    const double turn = stretch * posed.turn + 16 * u * posed.product;
+    atJoint += stretch * posed.shift + 16 * u * posed.span + turn * glm::length(dvec3(below[3]));
+    perDistance += turn * normOf(below);
+    below = posed.local * below;
+  }
+  return {atJoint, perDistance};
+}
+
+}  // namespace
+
+Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
+                               std::span<const std::span<const float>> masks,
+                               std::span<const ClipLayer> layers, std::uint32_t skin,
+                               const PackedClips* bank) {
+  if (const Result<void> checked = checkSkin(skeleton, skin); !checked) return checked.error();
+  if (const Result<void> checked = checkClips(skeleton, clips); !checked) return checked.error();
+  for (const std::span<const float> mask : masks)
+    if (mask.size() != skeleton.nodes.size()) return refused("a mask needs one factor per node");
+  if (layers.size() > maxClipLayers)
+    return refused("there are " + std::to_string(layers.size()) + " layers, but at most " +
+                   std::to_string(maxClipLayers) + " may be");
+  std::vector<Layer> resolved;
+  for (std::size_t index = 0; index < layers.size(); ++index) {
+    const Result<Layer> layer = toLayer(layers[index], clips, masks);
+    if (!layer) return refused("layer " + std::to_string(index) + ": " + layer.error().message);
+    resolved.push_back(*layer);
+  }
+  std::vector<std::uint32_t> parents;
+  for (const SkeletonNode& node : skeleton.nodes)
+    parents.push_back(node.parent < skeleton.nodes.size() ? node.parent : noJoint);
+  const std::vector<std::uint32_t> order = diagnosis::orderOf(parents);
+  if (order.size() != parents.size()) return refused("the parents of nodes form a cycle");
+
+  std::vector<PosedNode> nodes(parents.size());
+  for (const std::uint32_t node : order) {
+    const PosedNode above = parents[node] != noJoint ? nodes[parents[node]] : PosedNode();
+    nodes[node] = poseNode(skeleton, node, resolved, above, bank);
+  }
+  SampledPose pose;
+  const SkeletonSkin& posedSkin = skeleton.skins[skin];
+  for (std::size_t index = 0; index < posedSkin.joints.size(); ++index) {
+    const std::uint32_t joint = posedSkin.joints[index];
+    const dmat4 inverseBind = toMatrix(posedSkin.inverseBind[index].m);
+    const dmat4 matrix = nodes[joint].global * inverseBind;
+    Transform& result = pose.joints.emplace_back();
+    for (std::size_t row = 0; row < 3; ++row)
+      for (std::size_t column = 0; column < 4; ++column)
+        result[row][column] =
+            matrix[static_cast<glm::length_t>(column)][static_cast<glm::length_t>(row)];
+    if (bank != nullptr) pose.bounds.push_back(boundOf(nodes, parents, joint, inverseBind));
+  }
+  return pose;
+}
+
+}  // namespace dermis::reference
