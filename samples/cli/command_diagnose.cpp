@@ -78,7 +78,7 @@ Result<std::vector<JointMatrix>> readPose(const std::string& name) {
   return pose;
 }
 
-glm::dmat4 matrixOf(const gltf::GlobalTransform& rows) {
+glm::dmat4 matrixOf(const Transform& rows) {
   glm::dmat4 matrix(1);
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column)
@@ -90,7 +90,7 @@ glm::dmat4 matrixOf(const gltf::GlobalTransform& rows) {
 /// The transforms of all nodes relative to their parents.
 std::vector<JointMatrix> localTransforms(const gltf::Model& model, std::uint32_t clip,
                                          double time) {
-  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(model, clip, time);
+  const std::vector<Transform> globals = gltf::nodeGlobals(model, clip, time);
   std::vector<JointMatrix> locals;
   for (std::size_t node = 0; node < globals.size(); ++node) {
     glm::dmat4 local = matrixOf(globals[node]);

@@ -268,7 +268,7 @@ Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::st
 }
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
-  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
+  const std::vector<Transform> globals = gltf::nodeGlobals(*scene.model, clip, time);
   ScenePose pose;
   pose.poses.resize(scene.model->skins.size());
   for (const ScenePart& part : scene.parts) {

@@ -84,7 +84,7 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
              joints * sizeof(JointMatrix) + model_->nodes.size()))
     return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
-    const std::vector<gltf::GlobalTransform> globals =
+    const std::vector<Transform> globals =
         gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);
     for (const std::uint32_t skin : skins)
       sampled.poses.push_back(gltf::pose(*model_, skin, globals));

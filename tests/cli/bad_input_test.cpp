@@ -392,7 +392,7 @@ TEST_F(BadInput, RotationKeysThatAreNotOfUnitLengthAreNormalizedAndCounted) {
   const gltf::Model spline = loaded(rotating({0, 1}, {0, 0, 0, 0, 0, 0, 0,    1,    5, 0, 0, 5,  //
                                                       0, 9, 0, 0, 0, 0, half, half, 0, 0, 0, 0},
                                              "CUBICSPLINE"));
-  const gltf::GlobalTransform turned = gltf::nodeGlobals(spline, 0, 0.5).at(1);
+  const Transform turned = gltf::nodeGlobals(spline, 0, 0.5).at(1);
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t b = 0; b < 3; ++b) {
       const double dot =

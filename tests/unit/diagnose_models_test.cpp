@@ -139,7 +139,7 @@ Matrices poseOf(const PosedPart& part, const Matrices& globals, const Matrices& 
 void pose(PosedPart& part, std::uint32_t clip, double time) {
   const gltf::Model& model = *part.model;
   part.globals.clear();
-  for (const gltf::GlobalTransform& global : gltf::nodeGlobals(model, clip, time))
+  for (const Transform& global : gltf::nodeGlobals(model, clip, time))
     part.globals.push_back(matrixOf(global));
   part.locals = part.globals;
   for (std::size_t node = 0; node < part.locals.size(); ++node) {

@@ -258,7 +258,7 @@ TEST(GltfClips, ReplaceAMatrix) {
   file.json["nodes"][1]["matrix"] = {0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0, 2, 0, 1};
   gltf::Model model = loaded(file);
   expectOne(added(model, walk()), "node 1 'hip' of the model has a matrix, which has been decomp");
-  const gltf::GlobalTransform hip = gltf::nodeGlobals(model, 0, 1)[1];
+  const Transform hip = gltf::nodeGlobals(model, 0, 1)[1];
   EXPECT_EQ(hip[0][3], wayOfHip);
   EXPECT_NEAR(hip[1][0], 1, 1e-12) << "the rotation of the matrix stays";
 }

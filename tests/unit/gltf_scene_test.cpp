@@ -7,15 +7,14 @@
 namespace dermis::test {
 namespace {
 
-using gltf::GlobalTransform;
 using gltf::nodeGlobals;
 using gltf::none;
 
-std::array<double, 3> translationOf(const GlobalTransform& transform) {
+std::array<double, 3> translationOf(const Transform& transform) {
   return {transform[0][3], transform[1][3], transform[2][3]};
 }
 
-void expectTransform(const GlobalTransform& actual, const GlobalTransform& expected) {
+void expectTransform(const Transform& actual, const Transform& expected) {
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column) {
       EXPECT_NEAR(actual[row][column], expected[row][column], 1e-15)

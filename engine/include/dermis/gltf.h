@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 
@@ -202,10 +203,8 @@ struct Mesh {
   std::vector<float> morphWeights;
 };
 
-/// How values between keys are computed, as in glTF 2.0.
-enum class Interpolation : std::uint8_t { step = 0, linear = 1, cubicSpline = 2 };
-/// The property that a channel animates.
-enum class ChannelPath : std::uint8_t { translation = 0, rotation = 1, scale = 2, weights = 3 };
+using dermis::ChannelPath;
+using dermis::Interpolation;
 
 /// One animated property of one node. A clip has at most one channel for a node and a path.
 struct Channel {
@@ -346,10 +345,6 @@ DERMIS_GLTF_API std::optional<std::uint32_t> findClip(const Model& model,
 /// `model` is then unchanged.
 DERMIS_GLTF_API Result<std::vector<std::string>> addClips(Model& model, Model from);
 
-/// An affine transform as a row-major 3×4 matrix in double precision: `[row][column]`, column 3 is
-/// the translation.
-using GlobalTransform = std::array<std::array<double, 4>, 3>;
-
 /// The global transforms of all nodes at a time of a clip, in seconds. If `clip` is `none` or does
 /// not exist, it is the rest pose.
 ///
@@ -358,15 +353,15 @@ using GlobalTransform = std::array<std::array<double, 4>, 3>;
 /// Between keys it is interpolated as glTF 2.0, appendix C, defines: LINEAR rotations by slerp
 /// along the shorter arc, CUBICSPLINE with tangents scaled by the distance of the keys. Rotations
 /// are normalized after the interpolation.
-DERMIS_GLTF_API std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
-                                                         double time);
+DERMIS_GLTF_API std::vector<Transform> nodeGlobals(const Model& model, std::uint32_t clip,
+                                                   double time);
 
 /// The pose of a skin: joint global transform × inverse bind matrix for each joint, computed in
 /// double precision and rounded once to float32. `globals` is what `nodeGlobals` returned; all
 /// skins can share it. The transform of the skinned node has no effect (glTF 2.0, 3.7.3.3). Empty
 /// if the skin does not exist or `globals` is too short.
 DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
-                                              std::span<const GlobalTransform> globals);
+                                              std::span<const Transform> globals);
 
 /// `nodeGlobals` and `pose` in one call. For several skins, call `nodeGlobals` once instead.
 DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
@@ -379,5 +374,15 @@ DERMIS_GLTF_API std::vector<JointMatrix> pose(const Model& model, std::uint32_t 
 /// node.
 DERMIS_GLTF_API std::vector<float> morphWeights(const Model& model, std::uint32_t node,
                                                 std::uint32_t clip, double time);
+
+/// All nodes and skins of the model, with its numbers, as `packClips` takes them. Points into the
+/// model, which must outlive it and must not be changed.
+DERMIS_GLTF_API Skeleton skeleton(const Model& model);
+Skeleton skeleton(const Model&& model) = delete;
+
+/// All clips of the model, with its numbers, as `packClips` takes them: all channels but those of
+/// weights. Points into the model, which must outlive them and must not be changed.
+DERMIS_GLTF_API std::vector<ClipView> clips(const Model& model);
+std::vector<ClipView> clips(const Model&& model) = delete;
 
 }  // namespace dermis::gltf

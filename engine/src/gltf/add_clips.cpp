@@ -38,7 +38,7 @@ std::uint32_t targetsOf(const Model& model, std::uint32_t node) {
 
 // The distance of a node from its parent.
 double distanceOf(const Node& node) {
-  const GlobalTransform local = localTransform(node);
+  const Transform local = localTransform(node);
   return std::hypot(local[0][3], local[1][3], local[2][3]);
 }
 

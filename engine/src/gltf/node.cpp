@@ -9,7 +9,7 @@ namespace dermis::gltf {
 namespace {
 
 // The largest sum of the magnitudes in a column.
-double norm(const GlobalTransform& transform) {
+double norm(const Transform& transform) {
   double largest = 0;
   for (std::size_t column = 0; column < 4; ++column) {
     double sum = column == 3 ? 1 : 0;
@@ -27,7 +27,7 @@ void checkDecomposition(const Node& node, std::size_t index, Notes& notes) {
   Node parts;
   parts.matrix = node.matrix;
   decompose(parts);
-  const GlobalTransform transform = localTransform(node), product = localTransform(parts);
+  const Transform transform = localTransform(node), product = localTransform(parts);
   double difference = 0, largest = 0;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column) {

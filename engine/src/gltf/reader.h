@@ -103,6 +103,6 @@ inline bool isUnitLength(double length) {
 void decompose(Node& node);
 
 /// The local transform of a node in the rest pose.
-GlobalTransform localTransform(const Node& node);
+Transform localTransform(const Node& node);
 
 }  // namespace dermis::gltf

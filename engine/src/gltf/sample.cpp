@@ -13,8 +13,8 @@ struct LocalTransform {
   std::array<double, 3> scale;
 };
 
-GlobalTransform fromMatrix(const std::array<double, 16>& columns) {
-  GlobalTransform transform;
+Transform fromMatrix(const std::array<double, 16>& columns) {
+  Transform transform;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column) {
       transform[row][column] = columns[column * 4 + row];
@@ -24,7 +24,7 @@ GlobalTransform fromMatrix(const std::array<double, 16>& columns) {
 }
 
 // Translation × rotation × scale. The rotation has unit length.
-GlobalTransform compose(const LocalTransform& local) {
+Transform compose(const LocalTransform& local) {
   const auto [x, y, z, w] = local.rotation;
   const auto& s = local.scale;
   const auto& t = local.translation;
@@ -38,8 +38,8 @@ GlobalTransform compose(const LocalTransform& local) {
 
 // left × right, both affine; `Right` has [row][column] of any floating-point type.
 template <typename Right>
-GlobalTransform multiply(const GlobalTransform& left, const Right& right) {
-  GlobalTransform product;
+Transform multiply(const Transform& left, const Right& right) {
+  Transform product;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column) {
       double sum = column == 3 ? left[row][3] : 0;
@@ -70,12 +70,12 @@ void applyChannel(const Channel& channel, double time, LocalTransform& local) {
 
 }  // namespace
 
-GlobalTransform localTransform(const Node& node) {
+Transform localTransform(const Node& node) {
   return node.matrix ? fromMatrix(*node.matrix)
                      : compose({node.translation, node.rotation, node.scale});
 }
 
-std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip, double time) {
+std::vector<Transform> nodeGlobals(const Model& model, std::uint32_t clip, double time) {
   std::vector<LocalTransform> locals;
   locals.reserve(model.nodes.size());
   for (const Node& node : model.nodes) {
@@ -86,23 +86,22 @@ std::vector<GlobalTransform> nodeGlobals(const Model& model, std::uint32_t clip,
       applyChannel(channel, time, locals[channel.node]);
     }
   }
-  std::vector<GlobalTransform> globals(model.nodes.size());
+  std::vector<Transform> globals(model.nodes.size());
   for (const std::uint32_t index : model.nodeOrder) {
     const Node& node = model.nodes[index];
-    const GlobalTransform local = node.matrix ? localTransform(node) : compose(locals[index]);
+    const Transform local = node.matrix ? localTransform(node) : compose(locals[index]);
     globals[index] = node.parent == none ? local : multiply(globals[node.parent], local);
   }
   return globals;
 }
 
 std::vector<JointMatrix> pose(const Model& model, std::uint32_t skin,
-                              std::span<const GlobalTransform> globals) {
+                              std::span<const Transform> globals) {
   if (skin >= model.skins.size() || globals.size() < model.nodes.size()) return {};
   const Skin& from = model.skins[skin];
   std::vector<JointMatrix> matrices(from.joints.size());
   for (std::size_t i = 0; i < from.joints.size(); ++i) {
-    const GlobalTransform product =
-        multiply(globals[from.joints[i]], from.inverseBindMatrices[i].m);
+    const Transform product = multiply(globals[from.joints[i]], from.inverseBindMatrices[i].m);
     for (std::size_t row = 0; row < 3; ++row) {
       for (std::size_t column = 0; column < 4; ++column) {
         matrices[i].m[row][column] = static_cast<float>(product[row][column]);

@@ -57,10 +57,10 @@ std::vector<Joint> jointsOf(const cli::Scene& scene) {
 
 std::vector<glm::vec3> jointPositions(const cli::Scene& scene, const std::vector<Joint>& joints,
                                       std::uint32_t clip, double time) {
-  const std::vector<gltf::GlobalTransform> globals = gltf::nodeGlobals(*scene.model, clip, time);
+  const std::vector<Transform> globals = gltf::nodeGlobals(*scene.model, clip, time);
   std::vector<glm::vec3> positions;
   for (const Joint& joint : joints) {
-    const gltf::GlobalTransform& global = globals[joint.node];
+    const Transform& global = globals[joint.node];
     positions.emplace_back(global[0][3], global[1][3], global[2][3]);
   }
   return positions;
