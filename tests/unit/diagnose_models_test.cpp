@@ -11,7 +11,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -25,6 +24,8 @@
 #include <glm/vec4.hpp>
 
 #include "gltf_builder.h"
+#include "matrix_of.h"
+#include "model_files.h"
 #include "test_data.h"
 
 namespace dermis::test {
@@ -49,15 +50,6 @@ std::vector<JointMatrix> rounded(const Matrices& matrices) {
   std::vector<JointMatrix> result;
   for (const dmat4& m : matrices) result.push_back(rounded(m));
   return result;
-}
-
-template <typename Rows>
-dmat4 matrixOf(const Rows& rows) {
-  dmat4 m(1);
-  for (std::size_t row = 0; row < 3; ++row)
-    for (std::size_t column = 0; column < 4; ++column)
-      m[static_cast<int>(column)][static_cast<int>(row)] = static_cast<double>(rows[row][column]);
-  return m;
 }
 
 dmat4 withTranslation(dmat4 m, const dvec3& translation) {
@@ -481,12 +473,6 @@ void countMistakes(const PosedPart& part, Known known, Table& table) {
   }
 }
 
-bool isModel(const std::filesystem::path& path) {
-  static const std::set<std::string> extensions = {".gltf", ".glb", ".vrm"};
-  return extensions.contains(path.extension().string()) &&
-         path.generic_string().find("/negative_") == std::string::npos;
-}
-
 /// Which of the poses are used.
 struct Choice {
   std::size_t everyModel = 1;
@@ -513,10 +499,7 @@ PosedPart partOf(const gltf::Model& model, const gltf::SkinnedPrimitive& source,
 /// model without clips. Returns the number of models.
 int forEachPose(const std::filesystem::path& data, const Choice& choice,
                 const std::function<void(const PosedPart&, const std::string&)>& call) {
-  std::vector<std::filesystem::path> files;
-  for (const auto& file : std::filesystem::recursive_directory_iterator(data / "models"))
-    if (isModel(file.path())) files.push_back(file.path());
-  std::ranges::sort(files);
+  const std::vector<std::filesystem::path> files = modelFiles(data);
   int models = 0;
   for (std::size_t file = 0; file < files.size(); file += choice.everyModel) {
     const Result<gltf::Model> model = gltf::load(files[file]);

@@ -2,28 +2,13 @@
 // sound.
 #include <algorithm>
 #include <fstream>
-#include <set>
 
 #include "gltf_builder.h"
+#include "model_files.h"
 #include "test_data.h"
 
 namespace dermis::test {
 namespace {
-
-bool isModel(const std::filesystem::path& path) {
-  static const std::set<std::string> extensions = {".gltf", ".glb", ".vrm"};
-  return extensions.contains(path.extension().string()) &&
-         path.generic_string().find("/negative_") == std::string::npos;
-}
-
-std::vector<std::filesystem::path> models(const std::filesystem::path& data) {
-  std::vector<std::filesystem::path> found;
-  for (const auto& file : std::filesystem::recursive_directory_iterator(data / "models")) {
-    if (isModel(file.path())) found.push_back(file.path());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
 
 void checkPrimitive(const gltf::Primitive& primitive) {
   const std::size_t vertices = primitive.vertexCount;
@@ -42,7 +27,7 @@ void checkPrimitive(const gltf::Primitive& primitive) {
 TEST(GltfModels, AllLoad) {
   const auto data = testDataFolder();
   if (!data) GTEST_SKIP() << noTestData;
-  const auto files = models(*data);
+  const auto files = modelFiles(*data);
   EXPECT_GT(files.size(), 40u);
   for (const auto& file : files) {
     SCOPED_TRACE(file.string());
@@ -89,7 +74,7 @@ TEST(GltfModels, FormsAgree) {
 TEST(GltfModels, TruncationsAreRefused) {
   const auto data = testDataFolder();
   if (!data) GTEST_SKIP() << noTestData;
-  for (const auto& file : models(*data)) {
+  for (const auto& file : modelFiles(*data)) {
     SCOPED_TRACE(file.string());
     std::ifstream stream(file, std::ios::binary);
     const std::string content{std::istreambuf_iterator<char>(stream), {}};
