@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -13,43 +12,12 @@
 
 #include "dermis_command.h"
 #include "every_skinner.h"
+#include "golden_file.h"
 #include "ply.h"
 #include "test_data.h"
 
 namespace dermis::test {
 namespace {
-
-struct Golden {
-  std::vector<double> values;  ///< linear positions, then dual-quaternion positions
-  std::size_t vertices() const { return values.size() / 6; }
-  double at(bool dualQuaternion, std::size_t vertex, std::size_t axis) const {
-    return values[(dualQuaternion ? values.size() / 2 : 0) + vertex * 3 + axis];
-  }
-  /// The diagonal of the linear positions' box plus the largest coordinate.
-  double size() const {
-    double diagonal = 0, largest = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      double low = HUGE_VAL, high = -HUGE_VAL;
-      for (std::size_t vertex = 0; vertex < vertices(); ++vertex) {
-        const double value = at(false, vertex, axis);
-        if (std::isnan(value)) continue;
-        low = std::min(low, value);
-        high = std::max(high, value);
-        largest = std::max(largest, std::abs(value));
-      }
-      diagonal = std::hypot(diagonal, high - low);
-    }
-    return diagonal + largest;
-  }
-};
-
-Golden readGolden(const std::filesystem::path& path) {
-  Golden golden;
-  std::ifstream file(path, std::ios::binary);
-  for (double value; file.read(reinterpret_cast<char*>(&value), sizeof(value));)
-    golden.values.push_back(value);
-  return golden;
-}
 
 /// The largest distance over the model's size. `positions`: 3 floats a vertex.
 double compareWith(const Golden& golden, bool dualQuaternion, std::span<const float> positions) {
@@ -119,15 +87,13 @@ class GoldenTest : public SkinnerTest {
 };
 
 TEST_P(GoldenTest, EveryPoseAgrees) {
-  std::ifstream manifest(data_ / "golden" / "manifest.jsonl");
   std::size_t poses = 0;
   double worst = 0;
   // Poses of one model follow each other.
   std::filesystem::path loaded;
   Result<cli::Scene> scene = Error{};
-  for (std::string line; std::getline(manifest, line);) {
-    SCOPED_TRACE(line.substr(0, 160));
-    const nlohmann::json entry = nlohmann::json::parse(line);
+  for (const nlohmann::json& entry : goldenManifest(data_)) {
+    SCOPED_TRACE(entry["golden"].get<std::string>());
     const Golden golden = readGolden(data_ / "golden" / entry["golden"].get<std::string>());
     const std::filesystem::path model = data_ / "models" / entry["file"].get<std::string>();
     if (model != loaded) scene = cli::loadScene(loaded = model, {});
