@@ -255,8 +255,8 @@ part_gpu() {
 }
 
 part_exhaustive() {
-  build ci exhaustive_test real_models_test exhaustive_diagnose_test
-  tests ci -R '^(exhaustive_test|real_models_test|exhaustive_diagnose_test)/'
+  build ci exhaustive_test real_models_test exhaustive_diagnose_test exhaustive_clips_test
+  tests ci -R '^(exhaustive_test|real_models_test|exhaustive_diagnose_test|exhaustive_clips_test)/'
 }
 
 part_packages() {

@@ -1,0 +1,220 @@
+// Stored banks: they come back as they were, and damaged ones are refused or safe to sample.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <random>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clip_rig.h"
+#include "core_blob.h"
+#include "exhaustive.h"
+
+namespace dermis::test {
+namespace {
+
+/// Small, but with all that a bank may hold: masks, an additive clip, one that does not wrap, a
+/// constant track, and a jump.
+PackedRig& smallRig() {
+  static const std::unique_ptr<PackedRig> rig = [] {
+    gltf::Model model = armRig();
+    gltf::Clip jump{"jump", 1, {}};
+    jump.channels = {channel(arm::hand, ChannelPath::rotation, {0}, {0, 0.6f, 0, 0.8f}),
+                     channel(arm::body, ChannelPath::translation, {0, 0.4f}, {0, 0, 0, 1, 1, 1},
+                             Interpolation::step)};
+    model.clips.push_back(std::move(jump));
+    auto made = std::make_unique<PackedRig>(std::move(model));
+    made->clips[1].additive = true;
+    made->clips[1].baseClip = 0;
+    made->clips[2].wraps = false;
+    made->masks = {Floats(arm::nodeCount, 0.5f), Floats(arm::nodeCount, 0)};
+    made->masks[1][arm::hand] = 1;
+    made->options.maxError = 1e-2;
+    if (!made->pack()) made->bank.reset();
+    return made;
+  }();
+  return *rig;
+}
+
+class ClipsBank : public ::testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(smallRig().bank.has_value()); }
+  const PackedClips& bank() const { return *smallRig().bank; }
+  Blob blob() const { return Blob(bank().bytes()); }
+};
+
+void expectRefused(std::span<const std::byte> bytes, ErrorCode code = ErrorCode::invalidData) {
+  const Result<PackedClips> result = PackedClips::fromBytes(bytes);
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, code) << result.error().message;
+  EXPECT_FALSE(result.error().message.empty());
+}
+
+/// The pose is as long as it has to be, so that sanitizers see what is written behind it.
+void samplePoses(const PackedClips& bank) {
+  ASSERT_LE(bank.clipCount(), maxClips);
+  ASSERT_LE(bank.maskCount(), maxMasks);
+  const std::uint32_t lastClip = bank.clipCount() - 1;
+  for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
+    ASSERT_LE(bank.jointCount(skin), maxPoseJoints);
+    std::vector<JointMatrix> pose(bank.jointCount(skin));
+    EXPECT_TRUE(samplePose(bank, {}, skin, pose).ok());
+    for (std::uint32_t clip = 0; clip < bank.clipCount(); ++clip) {
+      const double duration = double{bank.clip(clip).duration};
+      ASSERT_TRUE(duration >= 0 && std::isfinite(duration));
+      for (const double time : {0.0, 0.4 * duration, duration, 1.7 * duration, -1e30}) {
+        const std::uint32_t mask = (clip + (time > 0 ? 1 : 0)) % (bank.maskCount() + 1);
+        const std::array<ClipLayer, 3> layers{
+            ClipLayer{.clip = clip, .time = time, .mask = mask},
+            ClipLayer{.clip = lastClip, .time = time, .weight = 2},
+            ClipLayer{.clip = clip, .time = time, .hold = true}};
+        EXPECT_TRUE(samplePose(bank, layers, skin, pose).ok());
+      }
+    }
+  }
+  for (std::uint32_t node = 0; node < arm::nodeCount + 2; ++node) (void)bank.error(node);
+}
+
+TEST_F(ClipsBank, ComesBackAsItWas) {
+  const Result<PackedClips> result = PackedClips::fromBytes(bank().bytes());
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_TRUE(std::ranges::equal(result->bytes(), bank().bytes()));
+  EXPECT_EQ(result->nodeCount(), bank().nodeCount());
+  EXPECT_EQ(result->skinCount(), 2u);
+  EXPECT_EQ(result->clipCount(), 3u);
+  EXPECT_EQ(result->maskCount(), 2u);
+  for (std::uint32_t skin = 0; skin < 3; ++skin)
+    EXPECT_EQ(result->jointCount(skin), bank().jointCount(skin));
+  for (std::uint32_t clip = 0; clip < 4; ++clip) {
+    const ClipInfo info = result->clip(clip);
+    EXPECT_EQ(info.duration, bank().clip(clip).duration);
+    EXPECT_EQ(info.wraps, clip < 2);
+    EXPECT_EQ(info.additive, clip == 1);
+  }
+  EXPECT_EQ(result->clip(3).duration, 0);
+  for (std::uint32_t node = 0; node <= arm::nodeCount; ++node) {
+    EXPECT_EQ(result->error(node).translation, bank().error(node).translation);
+    EXPECT_EQ(result->error(node).rotation, bank().error(node).rotation);
+    EXPECT_EQ(result->error(node).scale, bank().error(node).scale);
+  }
+  const std::array<ClipLayer, 2> layers{ClipLayer{.clip = 0, .time = 0.7, .mask = 2},
+                                        ClipLayer{.clip = 1, .time = 0.2, .weight = 0.5f}};
+  std::vector<JointMatrix> pose(result->jointCount(0));
+  ASSERT_TRUE(samplePose(*result, layers, 0, pose).ok());
+  EXPECT_TRUE(areSame(pose, smallRig().sample(layers)));
+}
+
+// Inside a file, a bank may begin at any byte.
+TEST_F(ClipsBank, IsReadFromAnyAddress) {
+  std::vector<std::byte> file(bank().bytes().size() + 3);
+  for (std::size_t offset = 0; offset < 4; ++offset) {
+    std::memcpy(file.data() + offset, bank().bytes().data(), bank().bytes().size());
+    const Result<PackedClips> result =
+        PackedClips::fromBytes(std::span(file).subspan(offset, bank().bytes().size()));
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_TRUE(std::ranges::equal(result->bytes(), bank().bytes()));
+  }
+}
+
+TEST_F(ClipsBank, TruncatedOrLongerIsRefused) {
+  std::vector<std::byte> bytes(bank().bytes().begin(), bank().bytes().end());
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    expectRefused(std::span(bytes).first(size));
+  for (int more = 0; more < 8; ++more) {
+    bytes.push_back({});
+    expectRefused(bytes);
+  }
+}
+
+// The checksum is right, and the header has the new length.
+TEST_F(ClipsBank, TruncatedOnPurposeIsRefusedOrSafe) {
+  for (std::size_t size = header::wordCount + 1; size < blob().size(); ++size) {
+    Blob shorter = blob();
+    shorter.words().resize(size);
+    shorter.words()[header::wordCount] = static_cast<std::uint32_t>(size);
+    shorter.seal();
+    const Result<PackedClips> result = PackedClips::fromBytes(shorter.bytes());
+    if (result) samplePoses(*result);
+  }
+}
+
+TEST_F(ClipsBank, OtherVersionsAndOtherBlobsAreRefused) {
+  for (const std::uint32_t version : {0u, blob().word(header::version) + 1, 0xffffffffu}) {
+    Blob other = blob();
+    other.words()[header::version] = version;
+    expectRefused(other.bytes(), ErrorCode::unsupportedVersion);
+    other.seal();
+    expectRefused(other.bytes(), ErrorCode::unsupportedVersion);
+  }
+  Blob other = blob();
+  other.words()[header::magic] = abi::MESH_MAGIC;
+  other.seal();
+  expectRefused(other.bytes());
+}
+
+TEST_F(ClipsBank, EachDamagedWordIsNoticed) {
+  for (std::size_t word = 0; word < blob().size(); ++word) {
+    if (word == header::version) continue;
+    for (const std::uint32_t bits : {1u, 0x80000000u, 0x00010000u, 0xffffffffu}) {
+      Blob damaged = blob();
+      damaged.words()[word] ^= bits;
+      expectRefused(damaged.bytes());
+    }
+  }
+}
+
+// What attackers do: the checksum is right.
+TEST_F(ClipsBank, EachChangedWordIsRefusedOrSafe) {
+  const std::size_t words = blob().size();
+  int accepted = 0, refused = 0;
+  for (std::size_t word = header::wordCount; word < words; ++word) {
+    const std::uint32_t value = blob().word(word), size = static_cast<std::uint32_t>(words);
+    for (const std::uint32_t changed :
+         {value ^ 1, value ^ 0x80000000u, ~value, value + 1, value - 1, value + 16, value * 2, 0u,
+          1u, size - 1, size, 0x7f800000u, 0x7fc00000u, 0x7f7fffffu, 0x3fffffffu, 0xffffffffu}) {
+      if (changed == value) continue;
+      SCOPED_TRACE("word " + std::to_string(word) + ": " + std::to_string(changed));
+      Blob other = blob();
+      other.words()[word] = changed;
+      other.seal();
+      const Result<PackedClips> result = PackedClips::fromBytes(other.bytes());
+      ++(result ? accepted : refused);
+      if (result) samplePoses(*result);
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_GT(accepted, 0);
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(ClipsBank, RandomChangesAreRefusedOrSafe) {
+  std::mt19937 random(1);
+  const int trials = isExhaustive ? 200'000 : 5'000;
+  for (int trial = 0; trial < trials; ++trial) {
+    Blob other = blob();
+    for (int change = 0; change < 1 + trial % 4; ++change) {
+      const std::size_t word =
+          header::wordCount + random() % (trial % 2 == 0 ? 64 : other.size() - header::wordCount);
+      const std::array<std::uint32_t, 6> values{static_cast<std::uint32_t>(random()),
+                                                static_cast<std::uint32_t>(random() % other.size()),
+                                                other.word(word) ^ 1u << random() % 32,
+                                                other.word(random() % other.size()),
+                                                0,
+                                                0xffffffffu};
+      other.words()[word] = values[random() % values.size()];
+    }
+    other.seal();
+    const Result<PackedClips> result = PackedClips::fromBytes(other.bytes());
+    if (result) samplePoses(*result);
+    ASSERT_FALSE(HasFatalFailure()) << trial;
+  }
+}
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,175 @@
+// All models with skins and clips: poses of their banks, and of those of their variants, are as
+// near to the clips as the bank says.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clip_rig.h"
+#include "clip_variants.h"
+#include "exhaustive.h"
+#include "gltf_builder.h"
+#include "model_files.h"
+#include "random_number.h"
+#include "test_data.h"
+#include "test_paths.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr std::uint32_t maxClipsOfModel = isExhaustive ? 1000 : 3;
+constexpr std::uint32_t timesPerClip = isExhaustive ? 400 : 12;
+constexpr std::uint32_t layersPerModel = isExhaustive ? 400 : 12;
+
+/// Models that have skins and clips: those of the samples, and of the test data if there are any.
+std::vector<std::filesystem::path> animatedFiles() {
+  std::vector<std::filesystem::path> files;
+  for (const char* name : {"arm.glb", "bar.glb", "figure.glb"})
+    files.push_back(std::filesystem::path(sampleModels) / name);
+  const auto data = testDataFolder();
+  if (!data) return files;
+  const std::vector<std::filesystem::path> more = modelFiles(*data);
+  files.insert(files.end(), more.begin(), more.end());
+  return files;
+}
+
+/// Calls with each model, and its number. At most `maxClipsOfModel` of its clips are kept.
+void forEachModel(const std::function<void(gltf::Model, std::uint32_t)>& call) {
+  std::uint32_t number = 0;
+  for (const std::filesystem::path& file : animatedFiles()) {
+    SCOPED_TRACE(file.string());
+    gltf::Model model = loaded(gltf::load(file));
+    if (model.skins.empty() || model.clips.empty()) continue;
+    if (model.clips.size() > maxClipsOfModel) model.clips.resize(maxClipsOfModel);
+    call(std::move(model), number++);
+  }
+  EXPECT_GE(number, testDataFolder() ? 20u : 3u);
+}
+
+/// Times at which much may go wrong: at keys, as near to them as possible, at the ends, and beyond.
+std::vector<double> timesOf(const ClipView& clip, std::mt19937& random) {
+  std::vector<double> times{0, clip.duration, -0.1, clip.duration + 0.1};
+  for (std::uint32_t i = 0; i < timesPerClip; ++i) {
+    times.push_back(clip.duration * between(random, -0.5, 1.5));
+    if (clip.channels.empty()) continue;
+    const ChannelView& channel = clip.channels[below(random, clip.channels.size())];
+    const float key = channel.times[below(random, channel.times.size())];
+    const float sides[] = {key, std::nextafter(key, -1.0f), std::nextafter(key, HUGE_VALF),
+                           key - 1e-4f, key + 1e-4f};
+    times.push_back(double{sides[i % std::size(sides)]});
+  }
+  return times;
+}
+
+/// Whether the clips have keys that a bank can hardly have by chance.
+bool hasInexactKeys(const PackedRig& rig) {
+  return std::ranges::any_of(rig.clips, [](const ClipView& clip) {
+    return std::ranges::any_of(clip.channels, [](const ChannelView& channel) {
+      return channel.path == ChannelPath::rotation && channel.times.size() > 10 &&
+             channel.interpolation == Interpolation::linear;
+    });
+  });
+}
+
+/// Each clip alone. Returns the largest error divided by its bound.
+double checkEachClip(const PackedRig& rig, std::mt19937& random) {
+  double worst = 0;
+  for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
+    SCOPED_TRACE("clip " + std::to_string(clip));
+    for (const double time : timesOf(rig.clips[clip], random)) {
+      SCOPED_TRACE("at " + std::to_string(time));
+      for (const bool hold : {false, true}) {
+        const ClipLayer layer{.clip = clip, .time = time, .hold = hold};
+        if (!rig.isNearJump(layer)) worst = std::max(worst, rig.check(layer));
+      }
+      if (::testing::Test::HasFailure()) return worst;
+    }
+  }
+  return worst;
+}
+
+/// Adds clips that do not wrap, and differences from the rest pose and from the first clip's start.
+/// Then packs with masks, and checks random layers of all of these.
+void checkLayers(PackedRig& rig, std::mt19937& random) {
+  ClipView once = rig.clips[0], fromRest = rig.clips.back(), fromFirst = rig.clips.back();
+  once.wraps = false;
+  fromRest.additive = fromFirst.additive = true;
+  fromFirst.baseClip = 0;
+  rig.clips.insert(rig.clips.end(), {once, fromRest, fromFirst});
+  for (int mask = 0; mask < 3; ++mask) {
+    Floats& factors = rig.masks.emplace_back(rig.skeleton.nodes.size());
+    for (float& factor : factors)
+      factor = static_cast<float>(chance(random, 30)   ? 0
+                                  : chance(random, 30) ? 1
+                                                       : between(random, 0, 1));
+  }
+  if (!rig.pack()) return;
+  for (std::uint32_t i = 0; i < layersPerModel; ++i) {
+    const std::vector<ClipLayer> layers = randomLayers(rig, random);
+    std::string text;
+    for (const ClipLayer& layer : layers) {
+      text += " (clip " + std::to_string(layer.clip) + " at " + std::to_string(layer.time) + " x " +
+              std::to_string(layer.weight) + ", mask " + std::to_string(layer.mask) + ")";
+    }
+    SCOPED_TRACE("layers" + text);
+    rig.check(layers);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(ClipsModels, EachClipIsWithinItsBound) {
+  double worst = 0;
+  std::uint64_t bytes = 0;
+  forEachModel([&](gltf::Model model, std::uint32_t) {
+    std::mt19937 random(1);
+    PackedRig rig(std::move(model));
+    if (!rig.pack()) return;
+    EXPECT_TRUE(rig.report.worstError > 0 || !hasInexactKeys(rig));
+    worst = std::max(worst, checkEachClip(rig, random));
+    bytes += rig.report.byteCount;
+  });
+  std::printf("%llu bytes; the largest error is %.3f of its bound\n",
+              static_cast<unsigned long long>(bytes), worst);
+  EXPECT_GT(worst, 0);
+}
+
+TEST(ClipsModels, LayersAreWithinTheirBounds) {
+  forEachModel([](gltf::Model model, std::uint32_t) {
+    std::mt19937 random(2);
+    PackedRig rig(std::move(model));
+    checkLayers(rig, random);
+  });
+}
+
+/// All variants, or in turn a model gets one of them.
+class ClipsVariants : public ::testing::TestWithParam<ClipVariant> {
+ protected:
+  static bool isChosen(std::uint32_t number) {
+    const auto variant = static_cast<std::uint32_t>(GetParam());
+    return isExhaustive || number % 4 == variant % 4;
+  }
+};
+
+TEST_P(ClipsVariants, AreWithinTheirBounds) {
+  forEachModel([](gltf::Model model, std::uint32_t number) {
+    if (!isChosen(number)) return;
+    std::mt19937 random(number);
+    PackedRig rig(withVariant(std::move(model), GetParam(), number));
+    if (!rig.pack()) return;
+    checkEachClip(rig, random);
+    checkLayers(rig, random);
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ClipsVariants, ::testing::ValuesIn(clipVariants),
+                         [](const auto& variant) { return clipVariantName(variant.param); });
+
+}  // namespace
+}  // namespace dermis::test

@@ -1,0 +1,230 @@
+// What `packClips` makes of hand-made skeletons: constant tracks, nodes at rest, jumps, its report.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "clip_rig.h"
+#include "random_number.h"
+
+namespace dermis::test {
+namespace {
+
+/// A rig with one clip of one channel.
+gltf::Model rigWith(double duration, gltf::Channel moved) {
+  gltf::Model model = armRig();
+  model.clips.clear();
+  model.clips.push_back({"only", duration, {std::move(moved)}});
+  return model;
+}
+
+/// At 100 random times, and at both ends.
+void checkClips(const PackedRig& rig) {
+  std::mt19937 random(1);
+  for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
+    const double duration = rig.clips[clip].duration;
+    rig.check(ClipLayer{.clip = clip});
+    rig.check(ClipLayer{.clip = clip, .time = duration, .hold = true});
+    for (int i = 0; i < 100; ++i) {
+      const ClipLayer layer{.clip = clip, .time = duration * between(random, -1, 2)};
+      if (!rig.isNearJump(layer)) rig.check(layer);
+    }
+  }
+}
+
+TEST(ClipsPack, KeepsTheError) {
+  PackedRig rig(armRig());
+  ASSERT_TRUE(rig.pack());
+  EXPECT_GT(rig.report.worstError, 0);
+  checkClips(rig);
+}
+
+TEST(ClipsPack, ReportsWhatItMade) {
+  PackedRig rig(armRig());
+  ASSERT_TRUE(rig.pack());
+  EXPECT_GE(rig.report.animatedTracks, 7u) << "channels of both clips";
+  EXPECT_GE(rig.report.keyCount, 2 * rig.report.animatedTracks);
+  const auto has = [&](const char* text) {
+    return rig.report.worst.find(text) != std::string::npos;
+  };
+  EXPECT_TRUE(has("wave") || has("reach")) << rig.report.worst;
+  EXPECT_TRUE(has("hand") || has("upper") || has("body") || has("prop")) << rig.report.worst;
+  EXPECT_TRUE(has(" at ")) << rig.report.worst;
+}
+
+TEST(ClipsPack, AFailureLeavesTheReport) {
+  PackedRig rig(armRig());
+  rig.report.byteCount = 77;
+  rig.report.worst = "before";
+  rig.clips[0].duration = -1;
+  EXPECT_FALSE(rig.tryToPack().ok());
+  EXPECT_EQ(rig.report.byteCount, 77u);
+  EXPECT_EQ(rig.report.worst, "before");
+}
+
+TEST(ClipsPack, NeedsNoReport) {
+  PackedRig rig(armRig());
+  ASSERT_TRUE(rig.pack());
+  const Result<PackedClips> again = packClips(rig.skeleton, rig.clips);
+  ASSERT_TRUE(again.ok());
+  EXPECT_TRUE(std::ranges::equal(again->bytes(), rig.bank->bytes())) << "the same bits each time";
+}
+
+TEST(ClipsPack, ALargerErrorTakesFewerBytes) {
+  std::uint64_t before = ~std::uint64_t{0};
+  for (const double error : {1e-5, 1e-4, 1e-3, 1e-2}) {
+    PackedRig rig(armRig());
+    rig.options.maxError = error;
+    ASSERT_TRUE(rig.pack());
+    EXPECT_EQ(rig.report.maxError, error);
+    EXPECT_LE(rig.report.byteCount, before);
+    before = rig.report.byteCount;
+    checkClips(rig);
+  }
+}
+
+TEST(ClipsPack, TheDefaultErrorFollowsTheExtent) {
+  gltf::Model large = armRig();
+  for (gltf::Node& node : large.nodes) {
+    for (double& length : node.translation) length *= 8;
+    if (node.matrix) {
+      for (std::size_t i = 12; i < 15; ++i) (*node.matrix)[i] *= 8;
+    }
+  }
+  PackedRig rig(armRig()), largeRig(std::move(large));
+  ASSERT_TRUE(rig.pack() && largeRig.pack());
+  EXPECT_NEAR(largeRig.report.maxError, 8 * rig.report.maxError, 1e-9);
+  EXPECT_GT(rig.report.maxError, 2e-5 * rig.extent());
+  EXPECT_LT(rig.report.maxError, 2e-4 * rig.extent());
+}
+
+TEST(ClipsPack, AChannelOfEqualKeysIsConstant) {
+  PackedRig rig(rigWith(
+      1, channel(arm::body, ChannelPath::translation, {0, 0.3f, 1}, {1, 2, 3, 1, 2, 3, 1, 2, 3})));
+  ASSERT_TRUE(rig.pack());
+  EXPECT_EQ(rig.report.animatedTracks, 0u);
+  EXPECT_EQ(rig.report.keyCount, 0u);
+  EXPECT_GE(rig.report.constantTracks, 1u);
+  checkClips(rig);
+}
+
+// q and -q are the same rotation.
+TEST(ClipsPack, RotationsOfOtherSignsAreConstant) {
+  PackedRig rig(rigWith(1, channel(arm::hand, ChannelPath::rotation, {0, 0.5f, 1},
+                                   {0.6f, 0, 0, 0.8f, -0.6f, 0, 0, -0.8f, 1.2f, 0, 0, 1.6f})));
+  ASSERT_TRUE(rig.pack());
+  EXPECT_EQ(rig.report.animatedTracks, 0u);
+  checkClips(rig);
+}
+
+TEST(ClipsPack, FoldsWhatNoClipMoves) {
+  PackedRig rig(armRig());
+  ASSERT_TRUE(rig.pack());
+  EXPECT_EQ(rig.bank->nodeCount(), 3u);
+  EXPECT_EQ(rig.bank->jointCount(0), 6u);
+  EXPECT_EQ(rig.bank->jointCount(1), 2u);
+  EXPECT_EQ(rig.bank->jointCount(2), 0u);
+  const auto isExact = [&](std::uint32_t node) {
+    const ClipError error = rig.bank->error(node);
+    return error.translation == 0 && error.rotation == 0 && error.scale == 0;
+  };
+  for (const std::uint32_t node : {arm::root, arm::prop, arm::shoulder, arm::collar, arm::stand})
+    EXPECT_TRUE(isExact(node)) << node;
+  EXPECT_TRUE(isExact(arm::nodeCount)) << "there is none";
+  for (const std::uint32_t node : {arm::hand, arm::upper, arm::body})
+    EXPECT_FALSE(isExact(node)) << node;
+}
+
+TEST(ClipsPack, WithoutClipsAllNodesRest) {
+  gltf::Model model = armRig();
+  model.clips.clear();
+  PackedRig rig(std::move(model));
+  ASSERT_TRUE(rig.pack());
+  EXPECT_EQ(rig.bank->nodeCount(), 0u);
+  rig.check(std::span<const ClipLayer>());
+}
+
+TEST(ClipsPack, NodesAreInAnyOrder) {
+  const gltf::Model model = armRig();
+  std::mt19937 random(1);
+  for (int order = 0; order < 10; ++order) {
+    std::vector<std::uint32_t> places(model.nodes.size());  // of the old nodes
+    for (std::uint32_t i = 0; i < places.size(); ++i) places[i] = i;
+    for (std::size_t i = places.size(); i > 1; --i)
+      std::swap(places[i - 1], places[below(random, i)]);
+    gltf::Model other = model;
+    const auto move = [&](std::uint32_t& node) {
+      if (node != gltf::none) node = places[node];
+    };
+    for (std::size_t i = 0; i < places.size(); ++i) other.nodes[places[i]] = model.nodes[i];
+    for (gltf::Node& node : other.nodes) move(node.parent);
+    for (std::uint32_t& node : other.nodeOrder) move(node);
+    for (gltf::Skin& skin : other.skins) std::ranges::for_each(skin.joints, move);
+    for (gltf::Clip& clip : other.clips)
+      for (gltf::Channel& channel : clip.channels) move(channel.node);
+    PackedRig rig(std::move(other));
+    ASSERT_TRUE(rig.pack());
+    checkClips(rig);
+  }
+}
+
+TEST(ClipsPack, AClipOfDurationZero) {
+  for (const Floats& times : {Floats{0}, Floats{0.5f}, Floats{0, 0}, Floats{-1, 1}}) {
+    Floats values{0.1f, 0.2f, 0.3f};
+    if (times.size() == 2) values.insert(values.end(), {1.1f, 1.2f, 1.3f});
+    PackedRig rig(rigWith(0, channel(arm::body, ChannelPath::translation, times, values)));
+    ASSERT_TRUE(rig.pack());
+    EXPECT_EQ(rig.bank->clip(0).duration, 0);
+    for (const double time : {0.0, 1.0, -3.5})
+      for (const bool hold : {false, true}) rig.check(ClipLayer{.time = time, .hold = hold});
+  }
+}
+
+TEST(ClipsPack, KeysOutsideOfTheClip) {
+  PackedRig rig(rigWith(1, channel(arm::body, ChannelPath::translation, {-0.7f, 0.4f, 1.9f},
+                                   {0, 0, 0, 0, 1, 0, 1, 0, 0})));
+  ASSERT_TRUE(rig.pack());
+  checkClips(rig);
+}
+
+// The clip's end is not its beginning: between them is no time.
+TEST(ClipsPack, ASeamStaysOne) {
+  PackedRig rig(
+      rigWith(1, channel(arm::body, ChannelPath::translation, {0, 1}, {0, 0, 0, 1, 0, 0})));
+  ASSERT_TRUE(rig.pack());
+  for (const double time : {0.0, 1e-7, 1e-4, 0.9999, 0.9999999, 1.0, 1.0001, -1e-4, 2.0})
+    rig.check(ClipLayer{.time = time});
+}
+
+TEST(ClipsPack, AJumpStaysOne) {
+  for (const float at : {0.1f, 0.31234f, 0.5f, 0.98765f}) {
+    PackedRig rig(rigWith(1, channel(arm::body, ChannelPath::translation, {0, at, at, 1},
+                                     {0, 0, 0, 0, 0, 0, 1, 2, 3, 1, 2, 3})));
+    ASSERT_TRUE(rig.pack());
+    EXPECT_LT(rig.report.keyCount, 50u);
+    // Rounded to 1/256 of an interval, which is no longer than the clip.
+    for (const double off : {1.0 / 250, 0.01, 0.1}) {
+      for (const double time : {double{at} - off, double{at} + off})
+        if (time > 0 && time < 1) rig.check(ClipLayer{.time = time});
+    }
+    checkClips(rig);
+  }
+}
+
+// Around a jump a bank has no slope. It keeps the error, or says where it cannot.
+TEST(ClipsPack, AJumpInMotionIsExactOrRefused) {
+  PackedRig rig(rigWith(1, channel(arm::body, ChannelPath::translation, {0, 0.41f, 0.41f, 1},
+                                   {0, 0, 0, 1, 0, 0, 5, 0, 0, 6, 0, 0})));
+  if (const Result<PackedClips> packed = rig.tryToPack(); !packed) {
+    EXPECT_EQ(packed.error().code, ErrorCode::limitExceeded);
+    EXPECT_NE(packed.error().message.find("only"), std::string::npos) << packed.error().message;
+    EXPECT_NE(packed.error().message.find("body"), std::string::npos) << packed.error().message;
+    return;
+  }
+  ASSERT_TRUE(rig.pack());
+  checkClips(rig);
+}
+
+}  // namespace
+}  // namespace dermis::test

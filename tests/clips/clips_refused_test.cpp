@@ -1,0 +1,241 @@
+// What `packClips` refuses, and that its message says where.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "clip_rig.h"
+
+namespace dermis::test {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double notANumber = std::numeric_limits<double>::quiet_NaN();
+
+/// Of the channel: clip "wave" turns "hand" first.
+constexpr const char *clipName = "wave", *nodeName = "hand";
+
+/// Expects an error that names these.
+void expectRefused(PackedRig& rig, ErrorCode code, const std::vector<std::string>& names) {
+  const Result<PackedClips> packed = rig.tryToPack();
+  ASSERT_FALSE(packed.ok());
+  const std::string& message = packed.error().message;
+  EXPECT_EQ(packed.error().code, code) << message;
+  EXPECT_FALSE(message.empty());
+  EXPECT_FALSE(message.ends_with('.')) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  for (const std::string& name : names)
+    EXPECT_NE(message.find(name), std::string::npos) << '"' << message << "\" without " << name;
+}
+
+void expectRefused(const std::function<void(PackedRig&)>& change,
+                   const std::vector<std::string>& names,
+                   ErrorCode code = ErrorCode::invalidArgument) {
+  PackedRig rig(armRig());
+  change(rig);
+  expectRefused(rig, code, names);
+}
+
+ChannelView& firstChannel(PackedRig& rig) {
+  return rig.clips[0].channels[0];
+}
+
+TEST(ClipsRefused, NodesWithNumbersThatAreNotFinite) {
+  for (const double bad : {infinity, -infinity, notANumber}) {
+    expectRefused([=](PackedRig& rig) { rig.skeleton.nodes[arm::hand].translation[1] = bad; },
+                  {nodeName});
+    expectRefused([=](PackedRig& rig) { rig.skeleton.nodes[arm::hand].rotation[3] = bad; },
+                  {nodeName});
+    expectRefused([=](PackedRig& rig) { rig.skeleton.nodes[arm::hand].scale[2] = bad; },
+                  {nodeName});
+    expectRefused([=](PackedRig& rig) { (*rig.skeleton.nodes[arm::prop].matrix)[2][3] = bad; },
+                  {"prop"});
+  }
+}
+
+TEST(ClipsRefused, ANodeWithoutRotation) {
+  expectRefused(
+      [](PackedRig& rig) {
+        rig.skeleton.nodes[arm::hand].rotation = {0, 0, 0, 0};
+      },
+      {nodeName});
+}
+
+TEST(ClipsRefused, ParentsInACycle) {
+  expectRefused([](PackedRig& rig) { rig.skeleton.nodes[arm::body].parent = arm::hand; }, {});
+  expectRefused([](PackedRig& rig) { rig.skeleton.nodes[arm::stand].parent = arm::stand; },
+                {"stand"});
+}
+
+TEST(ClipsRefused, AnAnimatedNodeWithAMatrix) {
+  expectRefused([](PackedRig& rig) { firstChannel(rig).node = arm::prop; }, {clipName, "prop"});
+}
+
+TEST(ClipsRefused, Skins) {
+  expectRefused([](PackedRig& rig) { rig.skeleton.skins.clear(); }, {"skin"});
+  const std::vector<std::uint32_t> joints{0, arm::nodeCount};
+  expectRefused([&](PackedRig& rig) { rig.skeleton.skins[1].joints = joints; }, {"stand"});
+  expectRefused(
+      [](PackedRig& rig) {
+        rig.skeleton.skins[1].inverseBind = rig.skeleton.skins[1].inverseBind.first(1);
+      },
+      {"stand"});
+  for (const double bad : {infinity, notANumber}) {
+    const std::vector<JointMatrix> matrices{
+        {}, {{{1, 0, 0, 0}, {0, 1, 0, static_cast<float>(bad)}, {0, 0, 1, 0}}}};
+    expectRefused([&](PackedRig& rig) { rig.skeleton.skins[1].inverseBind = matrices; }, {"stand"});
+  }
+}
+
+TEST(ClipsRefused, ASkinOfTooManyJoints) {
+  std::vector<std::uint32_t> joints(maxPoseJoints + 1, arm::hand);
+  std::vector<JointMatrix> matrices(joints.size());
+  const auto use = [&](PackedRig& rig) {
+    rig.skeleton.skins[1].joints = joints;
+    rig.skeleton.skins[1].inverseBind = matrices;
+  };
+  expectRefused(use, {"stand"}, ErrorCode::limitExceeded);
+  joints.pop_back();
+  matrices.pop_back();
+  PackedRig rig(armRig());
+  use(rig);
+  ASSERT_TRUE(rig.pack());
+  EXPECT_EQ(rig.bank->jointCount(1), maxPoseJoints);
+}
+
+TEST(ClipsRefused, Durations) {
+  for (const double bad : {-1e-3, infinity, notANumber})
+    expectRefused([=](PackedRig& rig) { rig.clips[1].duration = bad; }, {"reach"});
+}
+
+TEST(ClipsRefused, ChannelsThatDoNotFit) {
+  expectRefused([](PackedRig& rig) { firstChannel(rig).node = arm::nodeCount; }, {clipName});
+  expectRefused([](PackedRig& rig) { firstChannel(rig).times = {}; }, {clipName, nodeName});
+  expectRefused([](PackedRig& rig) { firstChannel(rig).values = {}; }, {clipName, nodeName});
+  expectRefused(
+      [](PackedRig& rig) { firstChannel(rig).values = firstChannel(rig).values.first(15); },
+      {clipName, nodeName});
+  // Three times as many values, or a quarter less.
+  expectRefused(
+      [](PackedRig& rig) { firstChannel(rig).interpolation = Interpolation::cubicSpline; },
+      {clipName, nodeName});
+  expectRefused([](PackedRig& rig) { firstChannel(rig).path = ChannelPath::translation; },
+                {clipName, nodeName});
+  expectRefused(
+      [](PackedRig& rig) { firstChannel(rig).interpolation = static_cast<Interpolation>(3); },
+      {clipName, nodeName});
+  expectRefused([](PackedRig& rig) { firstChannel(rig).path = static_cast<ChannelPath>(4); },
+                {clipName, nodeName});
+}
+
+TEST(ClipsRefused, TwoChannelsOfOneNodeAndPath) {
+  expectRefused([](PackedRig& rig) { rig.clips[0].channels.push_back(firstChannel(rig)); },
+                {clipName, nodeName});
+}
+
+TEST(ClipsRefused, KeysThatDescendOrAreNotFinite) {
+  const auto withTime = [](float time) {
+    const Floats times{0, 0.5f, time, 1.25f};
+    expectRefused([&](PackedRig& rig) { firstChannel(rig).times = times; }, {clipName, nodeName});
+  };
+  for (const double bad : {0.49, -1.0, 1.3, infinity, -infinity, notANumber})
+    withTime(static_cast<float>(bad));
+  for (const double bad : {infinity, -infinity, notANumber}) {
+    PackedRig rig(armRig());
+    Floats values(firstChannel(rig).values.begin(), firstChannel(rig).values.end());
+    values[6] = static_cast<float>(bad);
+    firstChannel(rig).values = values;
+    expectRefused(rig, ErrorCode::invalidArgument, {clipName, nodeName});
+  }
+}
+
+TEST(ClipsRefused, BasesOfAdditiveClips) {
+  const auto base = [](PackedRig& rig, std::uint32_t clip, double time) {
+    rig.clips[1].additive = true;
+    rig.clips[1].baseClip = clip;
+    rig.clips[1].baseTime = time;
+  };
+  expectRefused([&](PackedRig& rig) { base(rig, 1, 0); }, {"reach"});
+  for (const double bad : {infinity, notANumber})
+    expectRefused([&](PackedRig& rig) { base(rig, 0, bad); }, {"reach"});
+  expectRefused(
+      [&](PackedRig& rig) {
+        base(rig, 0, 0);
+        rig.clips[0].additive = true;
+      },
+      {"reach"});
+  // Without such a clip it is the pose at rest.
+  PackedRig rig(armRig());
+  base(rig, 2, 0);
+  EXPECT_TRUE(rig.pack());
+}
+
+TEST(ClipsRefused, Options) {
+  for (const double bad : {-1e-3, infinity, notANumber})
+    expectRefused([=](PackedRig& rig) { rig.options.maxError = bad; }, {"maxError"});
+  for (const double bad : {-1e-3, 1.001, infinity, notANumber}) {
+    expectRefused(
+        [=](PackedRig& rig) {
+          rig.masks.assign(2, Floats(arm::nodeCount, 1));
+          rig.masks[1][3] = static_cast<float>(bad);
+        },
+        {"mask"});
+  }
+  for (const std::uint32_t count : {0u, arm::nodeCount - 1, arm::nodeCount + 1})
+    expectRefused([=](PackedRig& rig) { rig.masks.emplace_back(count, 1.0f); }, {"mask"});
+  const JointBounds bounds;
+  const std::vector<const JointBounds*> meshes(3, &bounds);
+  expectRefused([&](PackedRig& rig) { rig.options.meshes = meshes; }, {"mesh"});
+  expectRefused([&](PackedRig& rig) { rig.options.meshes = std::span(meshes).first(1); }, {"mesh"});
+}
+
+TEST(ClipsRefused, MoreMasksThanTheMaximum) {
+  PackedRig rig(armRig());
+  rig.masks.assign(maxMasks, Floats(arm::nodeCount, 0.5f));
+  ASSERT_TRUE(rig.pack());
+  rig.masks.emplace_back(arm::nodeCount, 0.5f);
+  expectRefused(rig, ErrorCode::limitExceeded, {"mask", std::to_string(maxMasks)});
+}
+
+TEST(ClipsRefused, MoreClipsThanTheMaximum) {
+  PackedRig rig(armRig());
+  rig.clips.resize(2);
+  rig.clips.resize(maxClips, ClipView{.name = "empty", .duration = 1, .channels = {}});
+  ASSERT_TRUE(rig.pack());
+  rig.check(ClipLayer{.clip = maxClips - 1, .time = 0.5});
+  rig.clips.push_back(rig.clips.back());
+  expectRefused(rig, ErrorCode::limitExceeded, {std::to_string(maxClips)});
+}
+
+TEST(ClipsRefused, AnErrorThatCannotBeKept) {
+  PackedRig rig(armRig());
+  rig.clips.resize(1);
+  rig.options.maxError = 1e-12;
+  const Result<PackedClips> packed = rig.tryToPack();
+  ASSERT_FALSE(packed.ok());
+  expectRefused(rig, ErrorCode::limitExceeded, {clipName});
+  const std::string& message = packed.error().message;
+  EXPECT_TRUE(message.find("hand") != std::string::npos ||
+              message.find("upper") != std::string::npos ||
+              message.find("body") != std::string::npos)
+      << message;
+}
+
+// Its numbers are nobody's.
+TEST(ClipsRefused, AChannelOfWeightsIsNotRead) {
+  PackedRig rig(armRig());
+  ASSERT_TRUE(rig.pack());
+  const std::vector<std::byte> before(rig.bank->bytes().begin(), rig.bank->bytes().end());
+  const Floats times{0, 1}, values{1, 2, 3};
+  rig.clips[0].channels.push_back(
+      {arm::hand, ChannelPath::weights, Interpolation::linear, times, values});
+  ASSERT_TRUE(rig.pack());
+  EXPECT_TRUE(std::ranges::equal(rig.bank->bytes(), before));
+}
+
+}  // namespace
+}  // namespace dermis::test
