@@ -2,7 +2,6 @@
 // skin.
 
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "changed_blob.h"
 #include "dermis/plan.h"
 #include "kernel_reads.h"
 
@@ -53,22 +53,7 @@ std::vector<std::uint32_t> makeGoodBlob() {
   mesh.morphTargets = targets;
   const Result<PackedMesh> packed = pack(mesh, jointCount);
   require(packed.ok());
-  std::vector<std::uint32_t> words(packed->bytes().size() / 4);
-  std::memcpy(words.data(), packed->bytes().data(), packed->bytes().size());
-  return words;
-}
-
-/// The good blob with some of its words changed: a place (2 bytes), a way, and a number.
-std::vector<std::uint32_t> changedBlob(std::span<const std::uint8_t> data) {
-  static const std::vector<std::uint32_t> good = makeGoodBlob();
-  std::vector<std::uint32_t> words = good;
-  for (; data.size() >= 7; data = data.subspan(7)) {
-    std::uint32_t& word = words[(data[0] | std::size_t{data[1]} << 8) % words.size()];
-    std::uint32_t number;
-    std::memcpy(&number, data.data() + 3, 4);
-    word = data[2] % 2 == 0 ? number : word + (number % 64 - 32);
-  }
-  return words;
+  return fuzz::wordsOf(packed->bytes());
 }
 
 /// All other bytes, with a header that says what they are.
@@ -83,17 +68,6 @@ std::vector<std::uint32_t> blobOf(std::span<const std::uint8_t> data) {
     abi::store(words, 0, header);
   }
   return words;
-}
-
-/// The checksum would stop nearly every input: it is put right, so that what lies behind it is
-/// attacked.
-void putChecksumRight(std::vector<std::uint32_t>& words) {
-  constexpr std::size_t checksum = offsetof(abi::MeshHeader, checksum) / 4;
-  if (words.size() <= checksum) return;
-  std::uint32_t hash = 2166136261u;
-  for (std::size_t i = checksum + 1; i < words.size(); ++i)
-    hash = std::rotl((hash ^ words[i]) * 16777619u, 15);
-  words[checksum] = hash;
 }
 
 /// A job with all attributes that the mesh claims to have, and its first and last morph target.
@@ -125,9 +99,11 @@ void planWith(const MeshInfo& info) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
+  static const std::vector<std::uint32_t> good = makeGoodBlob();
   const std::span<const std::uint8_t> rest(data + 1, size - 1);
-  std::vector<std::uint32_t> words = data[0] % 2 == 0 ? blobOf(rest) : changedBlob(rest);
-  putChecksumRight(words);
+  std::vector<std::uint32_t> words =
+      data[0] % 2 == 0 ? blobOf(rest) : fuzz::changedBlob(good, rest);
+  fuzz::putChecksumRight(words);
   const Result<PackedMesh> mesh = PackedMesh::fromBytes(std::as_bytes(std::span(words)));
   if (!mesh) {
     require(!mesh.error().message.empty());
