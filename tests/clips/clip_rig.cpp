@@ -176,8 +176,11 @@ std::vector<JointMatrix> PackedRig::sample(std::span<const ClipLayer> layers,
 
 double PackedRig::check(std::span<const ClipLayer> layers) const {
   double worst = 0;
-  for (std::uint32_t skin = 0; skin < skeleton.skins.size(); ++skin)
+  const std::size_t skins = skeleton.skins.size();
+  for (std::size_t i = 0; i < std::min<std::size_t>(skins, 4); ++i) {
+    const auto skin = static_cast<std::uint32_t>(checkedSkins_++ % skins);
     worst = std::max(worst, checkSkin(layers, skin));
+  }
   return worst;
 }
 

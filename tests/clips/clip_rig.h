@@ -57,8 +57,8 @@ class PackedRig {
   std::vector<JointMatrix> sample(const ClipLayer& layer, std::uint32_t skin = 0) const {
     return sample(std::span(&layer, 1), skin);
   }
-  /// Checks the poses of all skins against the reference and its bounds. Returns the largest error
-  /// divided by its bound.
+  /// Checks the poses of up to four skins, in turn, against the reference and its bounds. Returns
+  /// the largest error divided by its bound.
   double check(std::span<const ClipLayer> layers) const;
   double check(const ClipLayer& layer) const { return check(std::span(&layer, 1)); }
   /// Whether the bank may jump a little earlier or later than the clip does at this time.
@@ -80,6 +80,7 @@ class PackedRig {
 
   std::vector<std::span<const float>> maskSpans() const;
   double extent_ = 1;
+  mutable std::size_t checkedSkins_ = 0;
 };
 
 /// Up to four random layers, additive ones and masks among them, that are not near a jump. The rig
