@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/cpu.h"
 #include "dermis/gltf.h"
 #include "dermis/mesh.h"
@@ -120,6 +121,45 @@ TEST(DocumentedExampleTest, AMeshIsMadeOfTheEnginesArrays) {
   EXPECT_EQ(mended.maxInfluences, 1u);
   ASSERT_FALSE(logged.empty());
   EXPECT_NE(logged[0].find("'triangle', vertex 2"), std::string::npos) << logged[0];
+}
+
+// [clips]
+/// Import: a bank of all clips of a file, to be stored with the assets.
+Result<PackedClips> packAnimations(const gltf::Model& model) {
+  PackClipsReport report;
+  const Skeleton skeleton = gltf::skeleton(model);
+  Result<PackedClips> bank = packClips(skeleton, gltf::clips(model), {}, &report);
+  if (bank) logWarning("largest error " + std::to_string(report.worstError) + ": " + report.worst);
+  return bank;
+}
+
+/// Each frame: the pose of a figure that walks, and runs more and more. `pose` is what `writePose`
+/// returned.
+Result<void> animate(const PackedClips& bank, double seconds, float speed,
+                     std::span<JointMatrix> pose) {
+  constexpr std::uint32_t walk = 0, run = 1, skin = 0;
+  const ClipLayer layers[] = {{.clip = walk, .time = seconds, .weight = 1 - speed},
+                              {.clip = run, .time = seconds, .weight = speed}};
+  return samplePose(bank, layers, skin, pose);
+}
+// [/clips]
+
+TEST(DocumentedExampleTest, FiguresAreAnimatedFromABank) {
+  logged.clear();
+  const auto file = std::filesystem::path(test::sampleModels) / "figure.glb";
+  const gltf::Model model = must(gltf::load(file));
+  const PackedClips packed = must(packAnimations(model));
+  ASSERT_FALSE(logged.empty());
+  const PackedClips bank = must(PackedClips::fromBytes(packed.bytes()));
+  ASSERT_GE(bank.clipCount(), 2u);
+  std::vector<JointMatrix> pose(bank.jointCount(0));
+  must(animate(bank, 0.3, 0, pose));
+  const std::vector<JointMatrix> exact = gltf::pose(model, 0, 0, 0.3);
+  ASSERT_EQ(pose.size(), exact.size());
+  for (std::size_t joint = 0; joint < pose.size(); ++joint)
+    EXPECT_NEAR(pose[joint].m[1][3], exact[joint].m[1][3], 1e-3);
+  must(animate(bank, 0.3, 0.5f, pose));
+  EXPECT_NE(pose[5].m[0][0], exact[5].m[0][0]);
 }
 
 // [gltf]

@@ -2,7 +2,7 @@
 # compiled.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
-set(core dermis/mesh.h dermis/scene.h dermis/cpu.h dermis/verify.h dermis/gltf.h dermis/compilers.h)
+set(core dermis/mesh.h dermis/clips.h dermis/scene.h dermis/cpu.h dermis/verify.h dermis/gltf.h dermis/compilers.h)
 set(vulkan dermis/vulkan/context.h dermis/vulkan/scene_recorder.h)
 set(loaders dermis/vulkan/drawing.h)
 set(create "int main() { return static_cast<int>(vkCreateInstance(nullptr, nullptr, nullptr)); }")

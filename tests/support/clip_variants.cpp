@@ -116,14 +116,14 @@ void makeIrregular(Channel& channel, std::mt19937& random) {
   channel = std::move(result);
 }
 
-/// The value after so many jumps.
+/// The value after so many jumps. Scales multiply along a chain, so theirs are small.
 dvec4 jumped(const Channel& channel, dvec4 value, int count) {
   const dvec4 step = dvec4(0.1, -0.2, 0.05, 0) * (glm::length(valueAt(channel, 0)) + 0.1);
   for (int i = 0; i < count; ++i) {
     if (channel.path == ChannelPath::rotation) {
       value = valueOf(quaternionOf(value) * dquat(0.8, 0.36, 0, 0.48));
     } else {
-      value = channel.path == ChannelPath::scale ? 1.25 * value : value + step;
+      value = channel.path == ChannelPath::scale ? 1.03 * value : value + step;
     }
   }
   return value;

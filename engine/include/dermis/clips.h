@@ -108,7 +108,7 @@ struct PackClipsReport {
   std::uint32_t animatedTracks = 0;  ///< tracks with keys
   std::uint32_t constantTracks = 0;  ///< tracks with one value
   double maxError = 0;               ///< that was asked for
-  /// The largest error found, at all keys of the bank and 16 points between two of them.
+  /// The largest error found, of whole poses, at keys and at three points between two of them.
   double worstError = 0;
   std::string worst;  ///< where: "clip 'walk', node 'hand', at 0.31 s"
 };
@@ -132,7 +132,8 @@ struct ClipError {
 
 /// A bank: a skeleton with its skins and clips, as a blob of little-endian 32-bit words, which it
 /// owns. Clips, skins and masks keep their numbers. The blob is relocatable and has a version
-/// number, so it can be stored with the assets.
+/// number, so it can be stored with the assets. A moved-from one may only be destroyed or assigned
+/// to.
 class DERMIS_CORE_API PackedClips {
  public:
   /// Makes a bank from stored bytes, which it copies. O(bytes): it checks the length, the version,

@@ -75,8 +75,8 @@ class BankCheck {
     const KeyFormat format = KeyFormat::of(keys.format);
     const std::uint64_t columns = keys.columnCount, intervals = std::uint64_t{keys.keyCount} - 1;
     return keys.format < 8 && format.size < 3 && keys.level < 32 && keys.keyCount >= 2 &&
-           columns > 0 && columns < 1u << trackColumnBits && keys.rowHalves % 2 == 0 &&
-           keys.rowHalves >= columns * format.halves() &&
+           keys.keyCount <= mostKeys && columns > 0 && columns < 1u << trackColumnBits &&
+           keys.rowHalves % 2 == 0 && keys.rowHalves >= columns * format.halves() &&
            isSection(keys.keys, keys.keyCount * std::uint64_t{keys.rowHalves / 2}) &&
            (format.isRotation || areFinite(keys.ranges, 6 * columns)) &&
            (keys.jumps == 0 || isSection(keys.jumps, intervals * ((columns + 3) / 4)));

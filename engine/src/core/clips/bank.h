@@ -66,6 +66,8 @@ struct BankClass {
 /// A word of `BankClip::tracks`: the kind, and a class and a column or the offset of a value.
 enum class TrackKind : std::uint32_t { rest = 0, constant = 1, animated = 2 };
 inline constexpr std::uint32_t trackColumnBits = 22;
+/// Of a track. Their numbers are exact in float32.
+inline constexpr std::uint32_t mostKeys = 1u << 24;
 constexpr std::uint32_t trackWord(TrackKind kind, std::uint32_t value) {
   return static_cast<std::uint32_t>(kind) << 30 | value;
 }
