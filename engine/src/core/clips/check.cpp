@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <set>
-#include <utility>
 
 #include "strict_floating_point.h"
 #include "text.h"
@@ -108,10 +108,11 @@ Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clip
     if (!std::isfinite(clip.duration) || clip.duration < 0 ||
         !std::isfinite(static_cast<float>(clip.duration)))
       return invalid(title + ": its duration is not finite, or negative");
-    std::set<std::pair<std::uint32_t, ChannelPath>> seen;
+    std::set<std::uint64_t> seen;  // nodes and paths
     for (const ChannelView& channel : clip.channels) {
       if (Result<void> good = checkChannel(skeleton, channel, title); !good) return good;
-      if (channel.path != ChannelPath::weights && !seen.insert({channel.node, channel.path}).second)
+      const auto property = std::uint64_t{channel.node} << 2 | static_cast<unsigned>(channel.path);
+      if (channel.path != ChannelPath::weights && !seen.insert(property).second)
         return invalid(title + " has two channels for one property of " +
                        titled("node", channel.node, skeleton.nodes[channel.node].name));
     }
