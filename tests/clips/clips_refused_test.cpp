@@ -225,6 +225,12 @@ TEST(ClipsRefused, AnErrorThatCannotBeKept) {
       << message;
 }
 
+// Found by a fuzzer: what was packed could not be read again.
+TEST(ClipsRefused, NumbersBeyondFloat32) {
+  expectRefused([](PackedRig& rig) { (*rig.skeleton.nodes[arm::prop].matrix)[2][3] = 1e200; },
+                {"float32"}, ErrorCode::limitExceeded);
+}
+
 // Its numbers are nobody's.
 TEST(ClipsRefused, AChannelOfWeightsIsNotRead) {
   PackedRig rig(armRig());

@@ -185,7 +185,8 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 ///   a clip is its own base or its base is additive, an option is out of range, or there are no
 ///   skins;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
-///   `maxPoseJoints` joints, or the error cannot be kept: the message names the clip and the node.
+///   `maxPoseJoints` joints, a number leaves the range of float32, or the error cannot be kept: the
+///   message names the clip and the node.
 DERMIS_CORE_API Result<PackedClips> packClips(const Skeleton& skeleton,
                                               std::span<const ClipView> clips,
                                               const PackClipsOptions& options = {},

@@ -370,7 +370,7 @@ class Packer {
       worst = errorOf(number, packed, curves, duration, worstNode, worstTime);
       if (worst <= maxError_) break;
     }
-    if (worst > maxError_) return unkept(number, worstNode, packed.rate);
+    if (!(worst <= maxError_)) return unkept(number, worstNode, packed.rate);
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       float* const errors[] = {&moved_[i].error.translation, &moved_[i].error.rotation,
                                &moved_[i].error.scale};
@@ -657,6 +657,10 @@ Result<PackedClips> packClips(const Skeleton& skeleton, std::span<const ClipView
   PackClipsReport found;
   Result<std::vector<std::uint32_t>> words = Packer(skeleton, clips, options).pack(found);
   if (!words) return words.error();
+  if (!std::isfinite(found.maxError) || !checkClips(*words)) {
+    return Error{ErrorCode::limitExceeded,
+                 "packClips: the skeleton or its clips have numbers beyond the range of float32"};
+  }
   PackedClips packed;
   packed.words_ = *std::move(words);
   if (report != nullptr) *report = found;
