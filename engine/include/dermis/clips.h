@@ -66,8 +66,8 @@ struct ChannelView {
   Interpolation interpolation = Interpolation::linear;
   /// Seconds, finite, not descending, at least one. If two are equal, the value jumps there.
   std::span<const float> times = {};
-  /// 3 finite values for each key, or 4 for rotations: x, y, z, w. For `cubicSpline` three times as
-  /// many: in-tangent, value, out-tangent.
+  /// 3 finite values for each key, or 4 for rotations: x, y, z, w, of any length but 0. For
+  /// `cubicSpline` three times as many: in-tangent, value, out-tangent.
   std::span<const float> values = {};
 };
 
@@ -110,7 +110,7 @@ struct PackClipsReport {
   double maxError = 0;               ///< that was asked for
   /// The largest error found, of whole poses, at keys and at three points between two of them.
   double worstError = 0;
-  std::string worst;  ///< where: "clip 'walk', node 'hand', at 0.31 s"
+  std::string worst;  ///< where: "clip 2 'walk', node 5 'hand', at 0.31 s"
 };
 
 // ---- The bank.
@@ -122,8 +122,9 @@ struct ClipInfo {
   bool additive = false;
 };
 
-/// How far the bank's local transform of a node is from that of its clips at most, at any time.
-/// What it blends is as far off as its parts.
+/// How far the bank's local transform of a node may be from that of its clips at any time at which
+/// no jump is rounded; for additive clips, their difference. Between keys it is bounded by the
+/// curvature of the source, except for splines of rotations, which are measured.
 struct ClipError {
   float translation = 0;  ///< distance
   float rotation = 0;     ///< angle in radians
@@ -174,16 +175,16 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 ///   a power of two. Rate and precision are the smallest that keep `maxError`.
 /// - Between two keys rotations are interpolated linearly and normalized, the others linearly.
 /// - A jump stays one: the interval that has it keeps the value before the jump until then, and the
-///   value of the next key from then on. Its time is rounded to 1/256 of the interval.
+///   value of the next key from then on. Its time is rounded, by at most 1.5/256 of the interval.
 /// - A clip that wraps has no seam that its channels do not have.
 /// - Nodes that no clip moves are folded into what hangs on them, in double precision.
 ///
-/// `report` may be null; it is written on success. O(keys × rates), some 0.1 s for a minute of 60
-/// joints. Fails with
+/// `report` may be null; it is written on success. O(keys × rates): for import, not for loading.
+/// Fails with
 /// - `invalidArgument` if a number is not finite, an index or a size does not fit, parents form a
-///   cycle, a node with a matrix is animated, two channels have one node and path, times descend,
-///   a clip is its own base or its base is additive, an option is out of range, or there are no
-///   skins;
+///   cycle, a rotation is 0, a node with a matrix is animated, two channels have one node and path,
+///   times descend, a clip is its own base or its base is additive, an option is out of range, or
+///   there are no skins;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
 ///   `maxPoseJoints` joints, a number leaves the range of float32, or the error cannot be kept: the
 ///   message names the clip and the node.
@@ -217,8 +218,9 @@ DERMIS_CORE_API float clipTime(const ClipInfo& clip, double seconds, bool hold =
 /// normalized. Where the sum is 0, and if there are no layers, the node rests. Additive layers
 /// follow in their order:
 ///
-///     q <- q · normalize(lerp(1, difference with a real part of at least 0, w m)),  t <- t + w m ·
-///     difference, s <- s · (1 + w m (ratio − 1))
+///     q <- q · normalize(lerp(1, d, w m)), where d is the difference, negated if its w is negative
+///     t <- t + w m · difference
+///     s <- s · (1 + w m (ratio − 1))
 ///
 /// O(nodes × layers). Any thread. Fails with `invalidArgument`, and writes nothing, if there are
 /// more than `maxClipLayers`, a clip, mask or skin does not exist, a time or weight is not finite,

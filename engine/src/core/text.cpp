@@ -71,6 +71,12 @@ std::string shortName(std::string_view name, std::size_t maxCharacters) {
   return line;
 }
 
+std::string decimal(double number) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.9g", number);
+  return text;
+}
+
 std::string inQuotes(std::string_view name) {
   std::string quoted(1, '\'');
   quoted += shortName(name);

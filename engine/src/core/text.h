@@ -20,6 +20,9 @@ DERMIS_CORE_API std::string oneLine(std::string_view text);
 /// The first characters of `oneLine(name)`, with "..." after them if there are more.
 DERMIS_CORE_API std::string shortName(std::string_view name, std::size_t maxCharacters = 80);
 
+/// A number with nine digits, or fewer if they are zeros.
+DERMIS_CORE_API std::string decimal(double number);
+
 /// `shortName` in single quotation marks.
 DERMIS_CORE_API std::string inQuotes(std::string_view name);
 

@@ -17,13 +17,16 @@ ClipView clipView(const Clip& clip) {
   result.duration = clip.duration;
   for (const Channel& channel : clip.channels) {
     if (channel.path == ChannelPath::weights) continue;
-    result.channels.push_back(
-        {channel.node, channel.path, channel.interpolation, channel.times, channel.values});
+    result.channels.push_back(viewOf(channel));
   }
   return result;
 }
 
 }  // namespace
+
+ChannelView viewOf(const Channel& channel) {
+  return {channel.node, channel.path, channel.interpolation, channel.times, channel.values};
+}
 
 Skeleton skeleton(const Model& model) {
   Skeleton result;

@@ -2,18 +2,11 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
 #include <limits>
 
 #include "strict_floating_point.h"
 
 namespace dermis::gltf {
-
-std::string textOf(double number) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g", number);
-  return text;
-}
 
 void fail(ErrorCode code, std::string message) {
   throw Failure{Error{code, std::move(message), 0}};

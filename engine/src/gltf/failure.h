@@ -21,7 +21,9 @@ struct Failure {
 inline std::string textOf(std::string_view text) {
   return std::string(text);
 }
-std::string textOf(double number);
+inline std::string textOf(double number) {
+  return decimal(number);
+}
 template <std::integral Integer>
 std::string textOf(Integer number) {
   return std::to_string(number);

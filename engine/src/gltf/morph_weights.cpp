@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "dermis/gltf.h"
-#include "gltf/interpolate.h"
+#include "gltf/reader.h"
 #include "strict_floating_point.h"
 
 namespace dermis::gltf {
@@ -34,7 +34,7 @@ std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uin
   std::vector<float> weights(mesh.morphTargetCount, 0.0f);
   if (const Channel* channel = findWeights(model, node, clip)) {
     std::vector<double> sampled(channel->components);
-    interpolate(*channel, time, sampled);
+    interpolate(viewOf(*channel), time, sampled);
     std::transform(sampled.begin(), sampled.end(), weights.begin(), toFloat);
   } else if (!from.morphWeights.empty()) {
     std::copy(from.morphWeights.begin(), from.morphWeights.end(), weights.begin());

@@ -133,18 +133,6 @@ void orderNodes(const Source& source, Model& model) {
 
 }  // namespace
 
-double normalizeQuaternion(std::array<double, 4>& quaternion) {
-  double square = 0;
-  for (const double component : quaternion) square += component * component;
-  const double length = std::sqrt(square);
-  if (!(length > 0) || !std::isfinite(length)) {
-    quaternion = {0, 0, 0, 1};
-    return length;
-  }
-  for (double& component : quaternion) component /= length;
-  return length;
-}
-
 void readNodes(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   model.nodes.resize(content.nodes.size());

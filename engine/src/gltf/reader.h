@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/clips/interpolate.h"
 #include "dermis/gltf.h"
 #include "gltf/accessor.h"
 
@@ -88,10 +89,6 @@ std::uint32_t morphTargetCount(const tinygltf::Mesh& mesh);
 /// Names a primitive in messages: "mesh 3 primitive 0".
 std::string primitivePlace(std::size_t mesh, std::size_t primitive);
 
-/// Divides a quaternion by its length, and returns the length. If that is impossible (length 0 or
-/// not finite), it becomes the identity.
-double normalizeQuaternion(std::array<double, 4>& quaternion);
-
 /// Whether the length of a rotation counts as 1. The tolerance is that of the official validator:
 /// the length may differ by so much if the components are rounded to bytes.
 inline bool isUnitLength(double length) {
@@ -101,6 +98,9 @@ inline bool isUnitLength(double length) {
 /// Replaces the node's matrix by a translation, a rotation and a scale. If it is mirrored, the x
 /// scale is negative, as in three.js. Shear is lost.
 void decompose(Node& node);
+
+/// The same channel for core.
+ChannelView viewOf(const Channel& channel);
 
 /// The local transform of a node in the rest pose.
 Transform localTransform(const Node& node);

@@ -1,5 +1,5 @@
+#include "core/affine.h"
 #include "dermis/gltf.h"
-#include "gltf/interpolate.h"
 #include "gltf/reader.h"
 #include "strict_floating_point.h"
 
@@ -23,45 +23,20 @@ Transform fromMatrix(const std::array<double, 16>& columns) {
   return transform;
 }
 
-// Translation × rotation × scale. The rotation has unit length.
 Transform compose(const LocalTransform& local) {
-  const auto [x, y, z, w] = local.rotation;
-  const auto& s = local.scale;
-  const auto& t = local.translation;
-  return {{{(1 - 2 * (y * y + z * z)) * s[0], 2 * (x * y - w * z) * s[1],
-            2 * (x * z + w * y) * s[2], t[0]},
-           {2 * (x * y + w * z) * s[0], (1 - 2 * (x * x + z * z)) * s[1],
-            2 * (y * z - w * x) * s[2], t[1]},
-           {2 * (x * z - w * y) * s[0], 2 * (y * z + w * x) * s[1],
-            (1 - 2 * (x * x + y * y)) * s[2], t[2]}}};
-}
-
-// left × right, both affine; `Right` has [row][column] of any floating-point type.
-template <typename Right>
-Transform multiply(const Transform& left, const Right& right) {
-  Transform product;
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 4; ++column) {
-      double sum = column == 3 ? left[row][3] : 0;
-      for (std::size_t i = 0; i < 3; ++i) {
-        sum += left[row][i] * static_cast<double>(right[i][column]);
-      }
-      product[row][column] = sum;
-    }
-  }
-  return product;
+  return composed(local.translation, local.rotation, local.scale);
 }
 
 void applyChannel(const Channel& channel, double time, LocalTransform& local) {
   switch (channel.path) {
     case ChannelPath::translation:
-      interpolate(channel, time, local.translation);
+      interpolate(viewOf(channel), time, local.translation);
       break;
     case ChannelPath::rotation:
-      interpolate(channel, time, local.rotation);
+      interpolate(viewOf(channel), time, local.rotation);
       break;
     case ChannelPath::scale:
-      interpolate(channel, time, local.scale);
+      interpolate(viewOf(channel), time, local.scale);
       break;
     case ChannelPath::weights:
       break;  // `morphWeights` samples them.

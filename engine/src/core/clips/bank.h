@@ -23,10 +23,10 @@ struct BankHeader {
   std::uint32_t magic, version, checksum, wordCount;
   std::uint32_t nodeCount, skinCount, clipCount, maskCount;
   std::uint32_t nodes, skins, clips, masks;  ///< `masks`: `nodeCount` factors for each
-  std::uint32_t sourceNodeCount, unused[3];
+  std::uint32_t unused[4];
 };
 
-/// A node that clips move. Parents come before their children, and nodes by ascending depth.
+/// A node that clips move. Parents come before their children.
 struct BankNode {
   std::uint32_t parent;  ///< a node of the bank, or `noNode`
   std::uint32_t source;  ///< node of the skeleton

@@ -35,12 +35,12 @@ Result<void> checkNodes(const std::vector<SkeletonNode>& nodes) {
     if (!isFinite) return invalid(title + " has a number that is not finite");
     if (std::ranges::all_of(node.rotation, [](double number) { return number == 0; }))
       return invalid(title + " has the rotation 0");
-    // No chain without a cycle is longer than the number of nodes.
-    std::size_t above = i;
-    for (std::size_t step = 0; above < nodes.size(); ++step) {
-      if (step > nodes.size()) return invalid(title + " is its own ancestor");
-      above = nodes[above].parent;
-    }
+  }
+  std::vector<bool> isReached(nodes.size());
+  for (const std::uint32_t node : parentsFirst(nodes)) isReached[node] = true;
+  if (const auto lost = std::ranges::find(isReached, false); lost != isReached.end()) {
+    const auto i = static_cast<std::size_t>(lost - isReached.begin());
+    return invalid(titled("node", i, nodes[i].name) + " is part of, or below, a cycle of parents");
   }
   return {};
 }
@@ -93,6 +93,13 @@ Result<void> checkChannel(const Skeleton& skeleton, const ChannelView& channel,
   }
   if (!areFinite(channel.times) || !areFinite(channel.values))
     return invalid(title + " has a key that is not finite");
+  for (std::size_t key = 0;
+       channel.path == ChannelPath::rotation &&
+       channel.interpolation != Interpolation::cubicSpline && key < channel.values.size();
+       key += 4) {
+    if (std::ranges::count(channel.values.subspan(key, 4), 0.0f) == 4)
+      return invalid(title + ": key " + std::to_string(key / 4) + " is the rotation 0");
+  }
   if (!std::ranges::is_sorted(channel.times)) return invalid(title + ": its key times descend");
   return {};
 }
@@ -125,6 +132,22 @@ Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clip
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> parentsFirst(const std::vector<SkeletonNode>& nodes) {
+  std::vector<std::vector<std::uint32_t>> children(nodes.size());
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+    if (nodes[i].parent < nodes.size())
+      children[nodes[i].parent].push_back(i);
+    else
+      order.push_back(i);
+  }
+  for (std::size_t next = 0; next < order.size(); ++next) {
+    const std::vector<std::uint32_t>& below = children[order[next]];
+    order.insert(order.end(), below.begin(), below.end());
+  }
+  return order;
+}
 
 std::string titled(const char* kind, std::size_t number, std::string_view name) {
   std::string title = kind;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "strict_floating_point.h"
 
@@ -19,16 +18,6 @@ Value mix(const Value& a, double share, const Value& b, double other) {
   return result;
 }
 
-Value slerp(const Value& from, const Value& to, double fraction) {
-  const double cosine = dot(from, to), direction = cosine < 0 ? -1 : 1;
-  const double squaredSine = 1 - cosine * cosine;
-  if (squaredSine <= std::numeric_limits<double>::epsilon())
-    return mix(from, 1 - fraction, to, direction * fraction);
-  const double sine = std::sqrt(squaredSine), angle = std::atan2(sine, cosine * direction);
-  return mix(from, std::sin((1 - fraction) * angle) / sine, to,
-             direction * std::sin(fraction * angle) / sine);
-}
-
 // The place of each part of a key of a spline.
 enum class Part : std::size_t { inTangent, value, outTangent };
 
@@ -41,28 +30,11 @@ Value part(const ChannelView& channel, std::size_t key, Part part) {
   return value;
 }
 
-/// The interval of a spline as a polynomial of the fraction: a + b f + c f² + d f³ (glTF 2.0,
-/// appendix C.5).
-std::array<Value, 4> spline(const ChannelView& channel, std::size_t key, double length) {
-  const Value from = part(channel, key, Part::value), to = part(channel, key + 1, Part::value);
-  const Value leaving = part(channel, key, Part::outTangent);
-  const Value arriving = part(channel, key + 1, Part::inTangent);
-  std::array<Value, 4> result{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double m = length * leaving[i], n = length * arriving[i], step = to[i] - from[i];
-    result[0][i] = from[i];
-    result[1][i] = m;
-    result[2][i] = 3 * step - 2 * m - n;
-    result[3][i] = m + n - 2 * step;
-  }
-  return result;
-}
-
 }  // namespace
 
-Value normalized(const Value& quaternion) {
-  const double length = std::sqrt(dot(quaternion, quaternion));
-  return length > 0 ? mix(quaternion, 1 / length, {}, 0) : Value{0, 0, 0, 1};
+Value normalized(Value quaternion) {
+  normalizeQuaternion(quaternion);
+  return quaternion;
 }
 
 Value product(const Value& a, const Value& b) {
@@ -84,28 +56,9 @@ Curve::Curve(const ChannelView* channel, ChannelPath path, const Value& rest,
 
 Value Curve::sourceAt(double time, Side side) const {
   if (channel_ == nullptr) return rest_;
-  const std::span<const float> times = channel_->times;
-  // The last key that is not after the time, or before it.
-  const auto after = std::partition_point(times.begin(), times.end(), [&](float key) {
-    return side == Side::after ? double{key} <= time : double{key} < time;
-  });
-  const auto next = static_cast<std::size_t>(after - times.begin());
-  const std::size_t key = next == 0 ? 0 : next - 1;
-  Value value = part(*channel_, key, Part::value);
-  if (next > 0 && next < times.size() && channel_->interpolation != Interpolation::step &&
-      time > double{times[key]}) {
-    const double length = double{times[next]} - double{times[key]};
-    const double f = (time - double{times[key]}) / length;
-    if (channel_->interpolation == Interpolation::cubicSpline) {
-      const std::array<Value, 4> p = spline(*channel_, key, length);
-      for (std::size_t i = 0; i < 4; ++i)
-        value[i] = p[0][i] + f * (p[1][i] + f * (p[2][i] + f * p[3][i]));
-    } else {
-      const Value to = part(*channel_, next, Part::value);
-      value = isRotation() ? slerp(value, to, f) : mix(value, 1 - f, to, f);
-    }
-  }
-  return isRotation() ? normalized(value) : value;
+  Value value{};
+  interpolate(*channel_, time, std::span(value).first(isRotation() ? 4 : 3), side);
+  return value;
 }
 
 Value Curve::at(double time, Side side) const {
@@ -169,10 +122,15 @@ std::optional<double> Curve::curvature(double from, double to) const {
       worst = std::max(worst, speed * speed);
       continue;
     }
-    // The second derivative is linear, so it is largest at an end.
-    const std::array<Value, 4> p = spline(*channel_, key, length);
-    for (const double f : {0.0, 1.0}) {
-      const Value second = mix(p[2], 2, p[3], 6 * f);
+    // The second derivative of the polynomial (glTF 2.0, appendix C.5) is linear, so it is largest
+    // at an end: 6 (to − from) − length (4 leaving + 2 arriving), all over length², and the other.
+    const Value step =
+        mix(part(*channel_, key + 1, Part::value), 1, part(*channel_, key, Part::value), -1);
+    const Value leaving = part(*channel_, key, Part::outTangent);
+    const Value arriving = part(*channel_, key + 1, Part::inTangent);
+    for (const double end : {1.0, -1.0}) {
+      const Value slopes = mix(leaving, -3 - end, arriving, -3 + end);
+      const Value second = mix(step, 6, slopes, length);
       worst = std::max(worst, std::sqrt(dot(second, second)) / (length * length * smallest));
     }
   }

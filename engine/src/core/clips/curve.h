@@ -6,14 +6,12 @@
 #include <optional>
 #include <vector>
 
+#include "clips/interpolate.h"
 #include "dermis/clips.h"
 
 namespace dermis {
 
 using Value = std::array<double, 4>;  ///< x, y, z, and w of rotations
-
-/// Which limit counts where a value jumps.
-enum class Side : std::uint8_t { before, after };
 
 /// One property of one node in one clip, or its value at rest.
 class Curve {
@@ -45,7 +43,7 @@ class Curve {
 
 /// The angle between two rotations of unit length in radians, or the distance of two vectors.
 double distance(const Value& a, const Value& b, bool isRotation);
-Value normalized(const Value& quaternion);
+Value normalized(Value quaternion);
 /// a · b of quaternions.
 Value product(const Value& a, const Value& b);
 

@@ -1,12 +1,14 @@
 // Samples poses of a bank in float32, operation by operation, so that every processor gets the same
 // bits.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "affine.h"
 #include "clips/bank.h"
 #include "dermis/clips.h"
 #include "strict_floating_point.h"
@@ -155,28 +157,6 @@ void add(Local& local, const Local& difference, float weight) {
   }
 }
 
-JointMatrix matrixOf(const Local& local) {
-  const auto& [x, y, z, w] = local.rotation;
-  const Float4 &s = local.scale, &t = local.translation;
-  return {{{(1 - 2 * (y * y + z * z)) * s[0], 2 * (x * y - w * z) * s[1],
-            2 * (x * z + w * y) * s[2], t[0]},
-           {2 * (x * y + w * z) * s[0], (1 - 2 * (x * x + z * z)) * s[1],
-            2 * (y * z - w * x) * s[2], t[1]},
-           {2 * (x * z - w * y) * s[0], 2 * (y * z + w * x) * s[1],
-            (1 - 2 * (x * x + y * y)) * s[2], t[2]}}};
-}
-
-JointMatrix product(const JointMatrix& a, const JointMatrix& b) {
-  JointMatrix result;
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 4; ++column) {
-      result.m[row][column] = a.m[row][0] * b.m[0][column] + a.m[row][1] * b.m[1][column] +
-                              a.m[row][2] * b.m[2][column] + (column == 3 ? a.m[row][3] : 0.0f);
-    }
-  }
-  return result;
-}
-
 /// The nearest float16, as float32; infinite above its range. Ties go to the even one.
 float roundedToHalf(float value) {
   if (!(std::abs(value) < 65520))
@@ -251,7 +231,7 @@ Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> lay
   const Result<std::vector<Layer>> resolved = resolve(clips, bank, layers);
   if (!resolved) return resolved.error();
 
-  std::vector<JointMatrix> globals(bank.header.nodeCount);
+  std::vector<Affine<float>> globals(bank.header.nodeCount);
   for (std::size_t i = 0; i < globals.size(); ++i) {
     const BankNode node = bank.node(i);
     const Local rest{vectorFrom(node.translation),
@@ -264,14 +244,15 @@ Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> lay
             layer.weight * bank.mask(layer.mask, i));
       }
     }
-    JointMatrix matrix = matrixOf(local);
-    if (node.fixed != 0) matrix = product(bank.at<JointMatrix>(node.fixed), matrix);
-    globals[i] = node.parent == noNode ? matrix : product(globals[node.parent], matrix);
+    Affine<float> matrix = composed(local.translation, local.rotation, local.scale);
+    if (node.fixed != 0) matrix = multiply(bank.at<Affine<float>>(node.fixed), matrix);
+    globals[i] = node.parent == noNode ? matrix : multiply(globals[node.parent], matrix);
   }
   for (std::size_t joint = 0; joint < pose.size(); ++joint) {
-    const auto matrix = bank.at<JointMatrix>(skin.matrices + 12 * joint);
+    const auto matrix = bank.at<Affine<float>>(skin.matrices + 12 * joint);
     const std::uint32_t node = bank.words[skin.nodes + joint];
-    pose[joint] = node == noNode ? matrix : product(globals[node], matrix);
+    pose[joint] =
+        std::bit_cast<JointMatrix>(node == noNode ? matrix : multiply(globals[node], matrix));
   }
   return {};
 }

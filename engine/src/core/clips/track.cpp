@@ -52,14 +52,15 @@ KeyBits vectorBits(const Value& v, KeyFormat format, const std::array<float, 6>&
 /// A curve at one level: what its keys should be, and how far those of a track are off.
 class Fit {
  public:
-  Fit(const Curve& curve, double duration, double rate, int level, double tolerance)
+  Fit(const Curve& curve, std::span<const double> keyTimes, std::span<const double> jumpTimes,
+      double duration, double rate, int level, double tolerance)
       : curve_(curve),
         duration_(duration),
         interval_(std::ldexp(1, level) / rate),
         tolerance_(tolerance),
         points_(std::max(2, 16 >> std::max(0, -level))),
-        jumpTimes_(curve.jumps(duration, tolerance / 4)),
-        keyTimes_(curve.keyTimes(duration)) {
+        jumpTimes_(jumpTimes),
+        keyTimes_(keyTimes) {
     const double intervals = std::max(1.0, std::ceil(duration / interval_ - 1e-6));
     values_.resize(static_cast<std::size_t>(intervals) + 1);
     jumps_.resize(values_.size() - 1);
@@ -197,7 +198,7 @@ class Fit {
   const Curve& curve_;
   double duration_, interval_, tolerance_;
   int points_;  ///< at which an interval is measured
-  std::vector<double> jumpTimes_, keyTimes_;
+  std::span<const double> jumpTimes_, keyTimes_;
   std::vector<Value> values_;
   std::vector<std::uint8_t> jumps_;
   bool isPossible_ = false;
@@ -296,10 +297,12 @@ std::optional<Track> fitTrack(const Curve& curve, const Value& rest, double dura
   if (std::optional<Track> constant = fitConstant(curve, rest, duration, tolerance))
     return constant;
   if (!(duration > 0)) return std::nullopt;
+  const std::vector<double> keyTimes = curve.keyTimes(duration);
+  const std::vector<double> jumpTimes = curve.jumps(duration, tolerance / 4);
   const int coarsest = std::clamp(static_cast<int>(std::ceil(std::log2(duration * rate))), 0, 20);
   for (int level = coarsest; level >= finestLevel; --level) {
     if (duration * rate / std::ldexp(1, level) > mostIntervals) break;
-    const Fit fit(curve, duration, rate, level, tolerance);
+    const Fit fit(curve, keyTimes, jumpTimes, duration, rate, level, tolerance);
     if (!fit.isPossible() || fit.errorOf(fit.values()) > tolerance) continue;
     Track track;
     track.kind = TrackKind::animated;

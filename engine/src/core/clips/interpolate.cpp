@@ -1,20 +1,20 @@
-#include "gltf/interpolate.h"
+#include "clips/interpolate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
-#include "gltf/reader.h"
 #include "strict_floating_point.h"
 
-namespace dermis::gltf {
+namespace dermis {
 namespace {
 
-// The place of each part of a key in `Channel::values`.
+// The place of each part of a key in `ChannelView::values`.
 enum class Part : std::size_t { inTangent, value, outTangent };
 
-const float* keyPart(const Channel& channel, std::size_t key, Part part) {
-  const std::size_t width = channel.components;
+// `width`: numbers of a value.
+const float* keyPart(const ChannelView& channel, std::size_t width, std::size_t key, Part part) {
   if (channel.interpolation != Interpolation::cubicSpline) return &channel.values[key * width];
   return &channel.values[(3 * key + static_cast<std::size_t>(part)) * width];
 }
@@ -40,12 +40,12 @@ void slerp(const float* from, const float* to, double fraction, std::span<double
 }
 
 // glTF 2.0, appendix C.5: a Hermite spline whose tangents are scaled by the time between the keys.
-void cubicSpline(const Channel& channel, std::size_t key, double distance, double t,
+void cubicSpline(const ChannelView& channel, std::size_t key, double distance, double t,
                  std::span<double> value) {
-  const float* from = keyPart(channel, key, Part::value);
-  const float* leaving = keyPart(channel, key, Part::outTangent);
-  const float* arriving = keyPart(channel, key + 1, Part::inTangent);
-  const float* to = keyPart(channel, key + 1, Part::value);
+  const float* from = keyPart(channel, value.size(), key, Part::value);
+  const float* leaving = keyPart(channel, value.size(), key, Part::outTangent);
+  const float* arriving = keyPart(channel, value.size(), key + 1, Part::inTangent);
+  const float* to = keyPart(channel, value.size(), key + 1, Part::value);
   const double t2 = t * t;
   const double t3 = t2 * t;
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -55,11 +55,11 @@ void cubicSpline(const Channel& channel, std::size_t key, double distance, doubl
   }
 }
 
-void between(const Channel& channel, std::size_t key, double time, std::span<double> value) {
+void between(const ChannelView& channel, std::size_t key, double time, std::span<double> value) {
   const double distance = double{channel.times[key + 1]} - double{channel.times[key]};
   const double fraction = (time - double{channel.times[key]}) / distance;
-  const float* from = keyPart(channel, key, Part::value);
-  const float* to = keyPart(channel, key + 1, Part::value);
+  const float* from = keyPart(channel, value.size(), key, Part::value);
+  const float* to = keyPart(channel, value.size(), key + 1, Part::value);
   if (channel.interpolation == Interpolation::cubicSpline) {
     cubicSpline(channel, key, distance, fraction, value);
   } else if (channel.path == ChannelPath::rotation) {
@@ -73,26 +73,34 @@ void between(const Channel& channel, std::size_t key, double time, std::span<dou
 
 }  // namespace
 
-void interpolate(const Channel& channel, double time, std::span<double> value) {
-  // The last key that is not after the time, or the first key if all are.
-  const auto after = std::upper_bound(channel.times.begin(), channel.times.end(), time,
-                                      [](double at, float key) { return !(at >= double{key}); });
+double normalizeQuaternion(std::span<double, 4> quaternion) {
+  double square = 0;
+  for (const double component : quaternion) square += component * component;
+  const double length = std::sqrt(square);
+  if (!(length > 0) || !std::isfinite(length)) {
+    std::ranges::copy(std::array<double, 4>{0, 0, 0, 1}, quaternion.begin());
+    return length;
+  }
+  for (double& component : quaternion) component /= length;
+  return length;
+}
+
+void interpolate(const ChannelView& channel, double time, std::span<double> value, Side side) {
+  // The last key that is not after the time, or that is before it; the first if there is none.
+  const auto after = std::partition_point(
+      channel.times.begin(), channel.times.end(),
+      [&](float key) { return side == Side::after ? time >= double{key} : time > double{key}; });
   const auto next = static_cast<std::size_t>(after - channel.times.begin());
   const std::size_t key = next == 0 ? 0 : next - 1;
   const bool hold = next == 0 || next == channel.times.size() ||
                     channel.interpolation == Interpolation::step ||
                     time == double{channel.times[key]};
   if (hold) {
-    std::copy_n(keyPart(channel, key, Part::value), value.size(), value.begin());
+    std::copy_n(keyPart(channel, value.size(), key, Part::value), value.size(), value.begin());
   } else {
     between(channel, key, time, value);
   }
-  if (channel.path == ChannelPath::rotation) {
-    std::array<double, 4> rotation;
-    std::copy_n(value.begin(), 4, rotation.begin());
-    normalizeQuaternion(rotation);
-    std::copy_n(rotation.begin(), 4, value.begin());
-  }
+  if (channel.path == ChannelPath::rotation) normalizeQuaternion(value.first<4>());
 }
 
-}  // namespace dermis::gltf
+}  // namespace dermis

@@ -1,0 +1,24 @@
+// Interpolates one channel at one time, in double precision.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "dermis/clips.h"
+
+namespace dermis {
+
+/// Which limit counts where a value jumps.
+enum class Side : std::uint8_t { before, after };
+
+/// Writes the channel's value at a time in seconds, clamped to its keys, to `value`: as many
+/// numbers as a key has. Rotations have unit length. A time that is NaN counts as before the first
+/// key.
+DERMIS_CORE_API void interpolate(const ChannelView& channel, double time, std::span<double> value,
+                                 Side side = Side::after);
+
+/// Divides a quaternion by its length, and returns the length. If that is impossible (length 0 or
+/// not finite), it becomes the identity.
+DERMIS_CORE_API double normalizeQuaternion(std::span<double, 4> quaternion);
+
+}  // namespace dermis
