@@ -52,7 +52,7 @@ if(DERMIS_SANITIZE STREQUAL "address")
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(dermis_build_flags INTERFACE -fsanitize=address,undefined)
   if(NOT DERMIS_SANITIZE_TESTS)
-    # These checks at each access cost a third of the compile time, and the address sanitizer finds nearly all that they find.
+    # These checks at each access cost up to a third of the compile time, and the address sanitizer finds nearly all that they find.
     target_compile_options(dermis_build_flags INTERFACE -fno-sanitize=null,object-size,vptr)
   endif()
 elseif(DERMIS_SANITIZE STREQUAL "thread")
