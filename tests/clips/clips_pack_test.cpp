@@ -118,6 +118,44 @@ TEST(ClipsPack, RotationsOfOtherSignsAreConstant) {
   checkClips(rig);
 }
 
+// Between keys a rotation needs unit length: a bank of longer ones is the same.
+TEST(ClipsPack, RotationsMayHaveAnyLength) {
+  const Floats times{0, 0.4f, 1};
+  PackedRig rig(rigWith(1, channel(arm::hand, ChannelPath::rotation, times,
+                                   {0, 0, 0, 1, 0.6f, 0, 0, 0.8f, 0, 1, 0, 0})));
+  PackedRig longer(rigWith(1, channel(arm::hand, ChannelPath::rotation, times,
+                                      {0, 0, 0, 2, 3, 0, 0, 4, 0, 0.25f, 0, 0})));
+  ASSERT_TRUE(rig.pack() && longer.pack());
+  EXPECT_TRUE(std::ranges::equal(rig.bank->bytes(), longer.bank->bytes()));
+  checkClips(longer);
+}
+
+TEST(ClipsPack, MeshesThatReachFartherNeedFinerRotations) {
+  const auto bytesWith = [](float length) {
+    const std::array<float, 3> position{0, length, 0};
+    const std::uint8_t joint = 0;
+    const float weight = 1;
+    const InfluenceSet influences{{&joint, 1, 1, ComponentType::uint8, 1},
+                                  {&weight, 1, 4, ComponentType::float32, 1}};
+    MeshView mesh;
+    mesh.vertexCount = 1;
+    mesh.positions = {position.data(), 1, 12, ComponentType::float32, 3};
+    mesh.influenceSets = {&influences, 1};
+    const Result<JointBounds> bounds = jointBounds(mesh, 1);
+    PackedRig rig(armRig());
+    // The joint that turns is the first of the skin.
+    const std::array<std::uint32_t, 1> joints{arm::hand};
+    const std::array<JointMatrix, 1> inverseBind;
+    rig.skeleton.skins = {{"one", joints, inverseBind}};
+    const std::array<const JointBounds*, 1> meshes{&*bounds};
+    rig.options.meshes = meshes;
+    rig.options.maxError = 1e-3;
+    EXPECT_TRUE(rig.pack());
+    return rig.report.byteCount;
+  };
+  EXPECT_GT(bytesWith(30), bytesWith(0.1f));
+}
+
 TEST(ClipsPack, FoldsWhatNoClipMoves) {
   PackedRig rig(armRig());
   ASSERT_TRUE(rig.pack());

@@ -231,7 +231,7 @@ TEST(ClipsRefused, NumbersBeyondFloat32) {
                 {"float32"}, ErrorCode::limitExceeded);
 }
 
-// Its numbers are nobody's.
+// The values of such a channel may be anything.
 TEST(ClipsRefused, AChannelOfWeightsIsNotRead) {
   PackedRig rig(armRig());
   ASSERT_TRUE(rig.pack());
