@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "strict_floating_point.h"
+
 namespace dermis {
 namespace {
 
