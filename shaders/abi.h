@@ -19,11 +19,11 @@ using uint = std::uint32_t;
 // per stage, kernels have the first MIN_BINDING_COUNT only: all attributes go to
 // BINDING_POSITIONS, and there are no results.
 DERMIS_CONSTANT BINDING_TABLES = 0u;
-DERMIS_CONSTANT BINDING_MESHES = 1u;  // palette kernel: the joint matrices
+DERMIS_CONSTANT BINDING_MESHES = 1u;  // meshes and clips; palette kernel: the joint matrices
 // Palettes, written by the palette kernel and read by the skin kernel. For linear blending in a
 // batch, the joint matrices are bound here instead.
 DERMIS_CONSTANT BINDING_PALETTES = 2u;
-DERMIS_CONSTANT BINDING_POSITIONS = 3u;
+DERMIS_CONSTANT BINDING_POSITIONS = 3u;  // compose kernel: the joint matrices
 DERMIS_CONSTANT MIN_BINDING_COUNT = 4u;
 DERMIS_CONSTANT BINDING_NORMALS = 4u;
 DERMIS_CONSTANT BINDING_TANGENTS = 5u;
@@ -159,6 +159,28 @@ struct MorphBlockRecord {
 };
 DERMIS_CONSTANT MORPH_BLOCK_WORDS = 4u;
 
+// ---- Clips: the bank that packClips makes (engine/src/core/clips/bank.h has its records), then a
+// word for each of its nodes, then steps (StepRecord). Of a bank, kernels know:
+DERMIS_CONSTANT CLIPS_OFFSETS = 8u;  // words: the offsets of nodes, skins, clips and masks
+DERMIS_CONSTANT CLIP_NODE_WORDS = 16u;
+DERMIS_CONSTANT CLIP_WORDS = 8u;
+DERMIS_CONSTANT CLIP_CLASS_WORDS = 8u;
+DERMIS_CONSTANT CLIP_ADDITIVE = 2u;  // in the flags of a clip
+DERMIS_CONSTANT TRACK_COLUMN_BITS = 22u;
+// The word of a node: by which matrix of the figure its transform is multiplied from the left.
+DERMIS_CONSTANT CLIP_ROOT = 0xffffffffu;    // by none
+DERMIS_CONSTANT CLIP_GLOBAL = 0x80000000u;  // flag: the matrix is a global transform
+
+// A product that the compose kernel computes: of `matrix` and the transforms of a node and of what
+// is above it.
+struct StepRecord {
+  uint node;    // or CLIP_ROOT: only the matrix
+  uint matrix;  // word offset in the bank; 0: the identity
+  uint place;   // the joint of the figure's poses, or if `matrix` is 0 a global transform
+  uint reserved;
+};
+DERMIS_CONSTANT STEP_WORDS = 4u;
+
 // ---- Records. A struct of scalars has the same layout in C++ and in std430. NAME_WORDS is the
 // size of a record in the tables or in a packed mesh. The tables are one buffer of words. Records
 // in it begin at multiples of four words, except ActiveMorph and CandidateRecord.
@@ -178,6 +200,25 @@ DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
 DERMIS_CONSTANT UNITS_OF_SCALE_SHEAR = 2u;
+
+// A figure whose poses are sampled. Layers of additive clips come after the others.
+struct FigureRecord {
+  uint
+      matrices;  // unit of the palettes buffer: the local transforms of its nodes, then global ones
+  uint poses;    // unit of the poses buffer: the joints of its first pose, then those of the others
+  uint layerCount;
+  uint reserved;
+  float time0;  // seconds inside the clip
+  uint layer0;  // clip, 10 bits; mask, 5 bits; a 0; weight as float16
+  float time1;
+  uint layer1;
+  float time2;
+  uint layer2;
+  float time3;
+  uint layer3;
+};
+DERMIS_CONSTANT FIGURE_WORDS = 12u;
+DERMIS_CONSTANT UNITS_OF_TRANSFORM = 3u;  // the rows of a 3×4 matrix
 
 // The unit at the beginning of a palette. The same as PoseStatus.
 struct StatusRecord {
@@ -327,6 +368,21 @@ DERMIS_CONSTANT BINDING_VISIBLE_RESULTS = 3u;
 struct PalettePush {
   uint palettes;  // word offset of the palette records
   uint workgroupCount;
+};
+// Offsets of clips are words of the mesh buffer.
+struct SamplePush {
+  uint figures;         // word offset of the figure records
+  uint workgroupCount;  // one for each figure
+  uint clips;           // the bank
+  uint nodeCount;
+};
+struct ComposePush {
+  uint figures;
+  uint workgroupCount;
+  uint clips;
+  uint above;  // the words of the nodes
+  uint steps;
+  uint stepCount;
 };
 struct ClearPush {
   uint results;  // word offset of the list of result indices

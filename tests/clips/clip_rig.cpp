@@ -53,6 +53,8 @@ double largestEntry(const dmat4& matrix) {
   return largest;
 }
 
+std::function<ClipSampler(const PackedClips&)> makeSampler;
+
 /// When a component jumps by more than this share of the largest.
 std::vector<double> jumpsOf(const ChannelView& channel, double share) {
   std::vector<double> jumps;
@@ -73,6 +75,10 @@ std::vector<double> jumpsOf(const ChannelView& channel, double share) {
 }
 
 }  // namespace
+
+void setClipSampler(std::function<ClipSampler(const PackedClips& clips)> make) {
+  makeSampler = std::move(make);
+}
 
 gltf::Channel channel(std::uint32_t node, ChannelPath path, Floats times, Floats values,
                       Interpolation interpolation) {
@@ -163,11 +169,13 @@ bool PackedRig::pack() {
   EXPECT_EQ(packed->maskCount(), masks.size());
   EXPECT_EQ(packed->skinCount(), skeleton.skins.size());
   bank = std::move(*packed);
+  if (makeSampler) sampler_ = makeSampler(*bank);
   return true;
 }
 
 std::vector<JointMatrix> PackedRig::sample(std::span<const ClipLayer> layers,
                                            std::uint32_t skin) const {
+  if (sampler_) return sampler_(layers, skin);
   std::vector<JointMatrix> pose(bank->jointCount(skin));
   const Result<void> sampled = samplePose(*bank, layers, skin, pose);
   EXPECT_TRUE(sampled.ok()) << sampled.error().message;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <random>
 #include <span>
@@ -39,6 +40,12 @@ gltf::Model armRig();
 /// One channel. `values` has 3 or 4 numbers for each key.
 gltf::Channel channel(std::uint32_t node, ChannelPath path, Floats times, Floats values,
                       Interpolation interpolation = Interpolation::linear);
+
+/// Samples the pose of a skin from one bank.
+using ClipSampler =
+    std::function<std::vector<JointMatrix>(std::span<const ClipLayer> layers, std::uint32_t skin)>;
+/// How rigs sample from now on. If it is empty: `samplePose`.
+void setClipSampler(std::function<ClipSampler(const PackedClips& clips)> make);
 
 /// A model, its skeleton and clips as they are packed, and their bank. What `packClips` gets may be
 /// changed before `pack`.
@@ -76,6 +83,7 @@ class PackedRig {
   std::optional<PackedClips> bank;
 
  private:
+  ClipSampler sampler_;
   double checkSkin(std::span<const ClipLayer> layers, std::uint32_t skin) const;
 
   std::vector<std::span<const float>> maskSpans() const;

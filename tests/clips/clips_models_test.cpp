@@ -14,6 +14,7 @@
 
 #include "clip_rig.h"
 #include "clip_variants.h"
+#include "clips/sample.h"
 #include "exhaustive.h"
 #include "gltf_builder.h"
 #include "model_files.h"
@@ -140,6 +141,46 @@ TEST(ClipsModels, EachClipIsWithinItsBound) {
   std::printf("%llu bytes; the largest error is %.3f of its bound\n",
               static_cast<unsigned long long>(bytes), worst);
   EXPECT_GT(worst, 0);
+}
+
+/// How far the columns of a joint matrix are from an orthonormal basis.
+double stretchOf(const JointMatrix& joint) {
+  double worst = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double product = i == j ? -1 : 0;
+      for (const auto& row : joint.m) product += double{row[i]} * double{row[j]};
+      worst = std::max(worst, std::abs(product));
+    }
+  }
+  return worst;
+}
+
+TEST(ClipsModels, JointsOfSkinsThatAreCalledRigidNeverScale) {
+  std::uint32_t rigid = 0, missed = 0, skins = 0;
+  forEachModel([&](gltf::Model model, std::uint32_t) {
+    std::mt19937 random(3);
+    PackedRig rig(std::move(model));
+    if (!rig.pack()) return;
+    for (std::uint32_t skin = 0; skin < rig.skeleton.skins.size(); ++skin) {
+      ++skins;
+      double worst = 0;
+      for (std::uint32_t i = 0; i < layersPerModel; ++i) {
+        for (const JointMatrix& joint : rig.sample(randomLayers(rig, random), skin))
+          worst = std::max(worst, stretchOf(joint));
+      }
+      if (isRigid(*rig.bank, skin)) {
+        ++rigid;
+        EXPECT_LT(worst, 1e-5) << "skin " << skin;
+      } else if (worst < 1e-6) {
+        ++missed;
+      }
+    }
+  });
+  std::printf("%u of %u skins are called rigid, and %u might be\n", rigid, skins, missed);
+  EXPECT_LE(missed, skins / 20);
+  EXPECT_GT(rigid, 0u);
+  EXPECT_TRUE(rigid < skins || !testDataFolder());
 }
 
 TEST(ClipsModels, LayersAreWithinTheirBounds) {

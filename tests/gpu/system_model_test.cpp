@@ -9,6 +9,7 @@
 
 #include "command_log.h"
 #include "counting_memory.h"
+#include "lone_figure.h"
 #include "model_steps.h"
 #include "system_test.h"
 
@@ -96,11 +97,14 @@ class GpuModelTest : public SystemTest,
     calls.push_back({[this, frame] { return system().abandonFrame(frame); }});
     calls.push_back({[this] { return withoutValue(system().addMesh(tooLarge_)); }});
     calls.push_back({[this] { return engine_->recorder().prepare({.mesh = {0, 7777}}); }});
-    const PoseHandle pose = anyPalette()->second.handle;
-    if (engine_->recorder().poseRange(pose).ok()) {
-      calls.push_back({[this, pose] { return withoutValue(system().writePose(pose)); }});
-    } else {
-      calls.push_back({[this, pose] { return system().markWritten({&pose, 1}); }});
+    for (const auto& [number, its] : model_->poses) {
+      const PoseHandle pose = its.handle;
+      if (its.figure) continue;
+      if (engine_->recorder().poseRange(pose).ok()) {
+        calls.push_back({[this, pose] { return withoutValue(system().writePose(pose)); }});
+      } else {
+        calls.push_back({[this, pose] { return system().markWritten({&pose, 1}); }});
+      }
     }
     const bool culls = std::ranges::any_of(model_->instances, [](const ModelInstance& instance) {
       return instance.description.culledOnGpu && instance.isVisible;
@@ -117,6 +121,20 @@ class GpuModelTest : public SystemTest,
     engine_->abandon({nextWords().handle(), 0}, [this] { changeMeanwhile(); });
   }
   std::uint64_t outputNow() override { return engine_->recorder().outputGeneration(); }
+  std::vector<JointMatrix> sampleAlone(std::uint32_t play, std::uint32_t skin) override {
+    const std::vector<JointMatrix> sampled =
+        LoneFigure(device(), *watched_, playedClips()).sample(playedLayers(play), skin);
+    expectNear(sampled, playedPose(play, skin));
+    return sampled;
+  }
+  /// As exact as float32 permits.
+  static void expectNear(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t joint = 0; joint < a.size(); ++joint) {
+      for (std::size_t i = 0; i < 12; ++i)
+        EXPECT_NEAR(a[joint].m[i / 4][i % 4], b[joint].m[i / 4][i % 4], 2e-5) << joint << ' ' << i;
+    }
+  }
   Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                     const InstanceDescription& description,
                     std::span<const MorphWeight> morphs) override {
@@ -147,8 +165,8 @@ bool isOfScenesOnly(const std::string& text) {
 TEST_P(GpuModelTest, EveryStepGivesWhatTheModelSays) {
   run();
   std::set<std::string> texts = errorTexts("vulkan/recorder/frame.cpp");
-  for (const char* file :
-       {"meshes_and_poses.cpp", "frame.cpp", "instances.cpp", "slot_map.h", "stores.cpp"})
+  for (const char* file : {"meshes_and_poses.cpp", "figures.cpp", "frame.cpp", "instances.cpp",
+                           "slot_map.h", "stores.cpp"})
     texts.merge(errorTexts(std::string("core/scene/") + file));
   EXPECT_GT(texts.size(), 30u);
   std::erase_if(texts, isOfScenesOnly);

@@ -1,8 +1,9 @@
-// Thousands of random steps of a scene beside a model of it: meshes, palettes and instances come
-// and go, move, hide, find no room and are moved about while frames are under way, buffers grow,
-// frames are abandoned, the GPU writes some poses, and every instance's output stays, bit for bit,
-// what it would be alone. On the CPU, the same steps without those that are the GPU's. Calls with
-// bad arguments, and Vulkan calls that fail, change nothing.
+// Thousands of random steps of a scene beside a model of it: meshes, palettes, figures and
+// instances come and go, move, hide, find no room and are moved about while frames are under way,
+// buffers grow, frames are abandoned, the GPU writes some poses, others are sampled from clips, and
+// every instance's output stays, bit for bit, what it would be alone. On the CPU, the same steps
+// without those that are the GPU's. Calls with bad arguments, and Vulkan calls that fail, change
+// nothing.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "played_clips.h"
 #include "refused_calls.h"
 #include "scene_meshes.h"
 #include "system_model.h"
@@ -77,6 +79,8 @@ class ModelSteps {
   virtual std::vector<RefusedCall> callsBetweenFrames() = 0;
   /// Differs if the output has become another buffer.
   virtual std::uint64_t outputNow() = 0;
+  /// The pose of a figure that plays this (played_clips.h), in a scene of its own.
+  virtual std::vector<JointMatrix> sampleAlone(std::uint32_t play, std::uint32_t skin) = 0;
   /// An instance skinned alone.
   virtual Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                             const InstanceDescription& description,
@@ -123,6 +127,7 @@ class ModelSteps {
     model_.emplace(*engine_);
     engine_->begin();
     narrow_ = must(system().addPose(1));
+    clips_ = must(system().addClips(playedClips()));
   }
 
   Scene& system() { return engine_->scene(); }
@@ -154,6 +159,7 @@ class ModelSteps {
   }
   void addPose() {
     if (model_->poses.size() >= 30) return;
+    if (chance(25)) return addFigure();
     const std::uint32_t pose = below(poseCount);
     const bool writtenByGpu = hasGpu && chance(40);
     if (chance(30))
@@ -167,9 +173,53 @@ class ModelSteps {
     model_->poses[nextNumber_++] = {*added, pose};
     engine_->writePose(*added, systemPose(pose));
   }
+  void addFigure() {
+    if (chance(30)) {
+      tryToAdd([&] { return system().addClips(playedClips()); },
+               [&](ClipsHandle added) { must(system().removeClips(added)); });
+      tryToAdd([&] { return system().addFigure(clips_); },
+               [&](FigureHandle added) { must(system().removeFigure(added)); });
+    }
+    const Result<FigureHandle> figure = system().addFigure(clips_);
+    if (!figure) {
+      messages_.insert(figure.error().message);
+      return;
+    }
+    for (std::uint32_t skin = 0; skin < playedSkins; ++skin) {
+      model_->poses[nextNumber_++] = {must(system().pose(*figure, skin)), poseOfPlay(0, skin),
+                                      *figure, skin};
+    }
+  }
+  void removeFigure(FigureHandle figure) {
+    const auto isOfIt = [&](const auto& pose) { return pose.second.figure == figure; };
+    const bool isUsed = std::ranges::any_of(model_->poses, [&](const auto& pose) {
+      return isOfIt(pose) && model_->isPoseUsed(pose.first);
+    });
+    const Result<void> removed = system().removeFigure(figure);
+    EXPECT_NE(removed.ok(), isUsed);
+    if (removed) std::erase_if(model_->poses, isOfIt);
+  }
+  /// Some figures play something, in one call, some twice.
+  void play(std::uint32_t percent) {
+    std::vector<FigurePlay> plays;
+    for (auto& [number, pose] : model_->poses) {
+      if (!pose.figure || pose.skin != 0 || !chance(percent)) continue;
+      const std::uint32_t played = below(playCount);
+      if (chance(20)) plays.push_back({pose.figure, playedLayers(below(playCount))});
+      plays.push_back({pose.figure, playedLayers(played)});
+      for (const auto& [other, its] : model_->poses) {
+        if (its.figure == pose.figure) model_->writePose(other, poseOfPlay(played, its.skin));
+      }
+    }
+    must(system().play(plays));
+  }
+  static std::uint32_t poseOfPlay(std::uint32_t play, std::uint32_t skin) {
+    return poseCount + play * playedSkins + skin;
+  }
   void removePose() {
     if (model_->poses.size() < 3) return;
     const auto palette = anyPalette();
+    if (palette->second.figure) return removeFigure(palette->second.figure);
     const Result<void> removed = system().removePose(palette->second.handle);
     EXPECT_NE(removed.ok(), model_->isPoseUsed(palette->first));
     if (removed) model_->poses.erase(palette);
@@ -321,8 +371,9 @@ class ModelSteps {
   }
   void runFrame() {
     const std::uint32_t moving = below(4) * 30;  // percent of the poses; at times all rest
+    play(moving);
     for (auto& [number, palette] : model_->poses) {
-      if (!chance(moving)) continue;
+      if (palette.figure || !chance(moving)) continue;
       const std::uint32_t pose = below(poseCount);
       engine_->writePose(palette.handle, systemPose(pose));
       model_->writePose(number, pose);
@@ -431,16 +482,51 @@ class ModelSteps {
         system(), {description, instance.handle,
                    gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())], narrow_});
     addRefusedCalls(calls);
+    addRefusedClips(calls);
     refuseOne(calls);
+  }
+
+  void addRefusedClips(std::vector<RefusedCall>& calls) {
+    const auto add = [&](auto call) { calls.push_back({[call] { return withoutValue(call()); }}); };
+    Scene& scene = system();
+    add([&scene] { return scene.addFigure({}); });
+    add([&scene] { return scene.removeClips({7777, 1}); });
+    add([&scene] { return scene.removeFigure({}); });
+    add([&scene] { return scene.pose(FigureHandle{}); });
+    const auto found = std::ranges::find_if(
+        model_->poses, [](const auto& pose) { return bool{pose.second.figure}; });
+    if (found == model_->poses.end()) return;
+    const ModelPose pose = found->second;
+    add([&scene, clips = clips_] { return scene.removeClips(clips); });
+    add([&scene, pose] { return scene.pose(pose.figure, playedSkins); });
+    add([&scene, pose] { return scene.removePose(pose.handle); });
+    add([&scene, pose] { return scene.writePose(pose.handle); });
+    add([&scene, pose] { return scene.markWritten({&pose.handle, 1}); });
+    const auto play = [&](FigureHandle figure, std::vector<ClipLayer> layers) {
+      add([&scene, pose, figure, layers] {
+        const std::array<FigurePlay, 2> plays{{{pose.figure, playedLayers(3)}, {figure, layers}}};
+        const Result<void> played = scene.play(plays);
+        EXPECT_EQ(played.error().message.substr(0, 9), "entry 1: ") << played.error().message;
+        return played;
+      });
+    };
+    play({}, {});
+    play(pose.figure, {{.clip = 3}});
+    play(pose.figure, {{}, {.mask = 2}});
+    play(pose.figure, {{.time = NAN}});
+    play(pose.figure, std::vector<ClipLayer>(maxClipLayers + 1));
   }
 
   /// Between `record` and `abandonFrame`, when poses cannot be written.
   void changeMeanwhile() {
     if (chance(30)) refuseOne(callsBetweenFrames());
     for (std::uint32_t count = below(6); count != 0; --count) {
-      switch (below(6)) {
+      switch (below(7)) {
         case 0:
           addMesh();
+          break;
+        case 6:
+          play(30);
           break;
         case 1:
           removeMesh();
@@ -473,6 +559,7 @@ class ModelSteps {
     if (kind < 70) return changeSeveral();
     if (kind < 75) return setVisibility();
     if (kind < 81) return tryWhatIsRefused();
+    if (kind < 84) return play(50);
     runFrame();
   }
 
@@ -503,8 +590,15 @@ class ModelSteps {
         expected_[{content, description.layout.positions, description.layout.tangents}];
     if (streams[positionStream].empty())
       streams =
-          skinAlone(kinds_[kind], systemPose(shown.pose), description, morphSets[shown.morphs]);
+          skinAlone(kinds_[kind], matricesOf(shown.pose), description, morphSets[shown.morphs]);
     return streams;
+  }
+  const std::vector<JointMatrix>& matricesOf(std::uint32_t pose) {
+    std::vector<JointMatrix>& matrices = matrices_[pose];
+    if (!matrices.empty()) return matrices;
+    if (pose < poseCount) return matrices = systemPose(pose);
+    return matrices =
+               sampleAlone((pose - poseCount) / playedSkins, (pose - poseCount) % playedSkins);
   }
   void expectBounds(const ModelInstance& instance) {
     const std::optional<Box> box = must(system().bounds(instance.handle));
@@ -547,6 +641,8 @@ class ModelSteps {
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
   PoseHandle narrow_;
+  ClipsHandle clips_;
+  std::map<std::uint32_t, std::vector<JointMatrix>> matrices_;  ///< of poses
   std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;
   std::set<std::string> messages_;  ///< of all errors
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;

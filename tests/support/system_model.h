@@ -29,6 +29,8 @@ struct ShownPose {
 struct ModelPose {
   PoseHandle handle;
   std::uint32_t pose = 0;
+  FigureHandle figure = {};  ///< null: somebody writes it
+  std::uint32_t skin = 0;    ///< of the figure
 };
 
 struct ModelInstance {

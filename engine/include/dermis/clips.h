@@ -184,7 +184,7 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 /// - `invalidArgument` if a number is not finite, an index or a size does not fit, parents form a
 ///   cycle, a rotation is 0, a node with a matrix is animated, two channels have one node and path,
 ///   times descend, a clip is its own base or its base is additive, an option is out of range, or
-///   there are no skins;
+///   there are no skins, or one has no joints;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
 ///   `maxPoseJoints` joints, a number leaves the range of float32, or the error cannot be kept: the
 ///   message names the clip and the node.

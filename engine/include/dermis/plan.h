@@ -186,6 +186,7 @@ struct PipelineNeeds {
   VertexLayout layout = {};
   bool bounds = false;       ///< `Job::bounds`
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
+  bool figures = false;      ///< whether poses belong to figures (`Scene::addFigure`)
   // -- Optional. Each of these reduces the number of pipelines. Instances that differ from it are
   // then not prepared.
   /// What is true of all meshes: `maxInfluences` is the maximum, `minInfluences` the minimum, and
@@ -195,9 +196,9 @@ struct PipelineNeeds {
 };
 
 /// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
-/// `culledOnGpu` also the visibility kernel. Fails as `placeVertices` does, and with
-/// `invalidArgument` if the layout breaks a rule of `OutputAttribute`, or if the method, the limits
-/// or the tuning are not valid.
+/// `culledOnGpu` also the visibility kernel, and with `figures` the two that sample clips. Fails as
+/// `placeVertices` does, and with `invalidArgument` if the layout breaks a rule of
+/// `OutputAttribute`, or if the method, the limits or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);
@@ -268,7 +269,7 @@ struct DispatchCommand {
   /// of `bindings[0]`.
   std::optional<std::uint64_t> indirectOffset;
   /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
-  /// SkinPush or VisibilityPush of shaders/abi.h.
+  /// SkinPush, VisibilityPush, SamplePush or ComposePush of shaders/abi.h.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
   /// Valid as long as the commands. They are all that the kernel declares: a descriptor of a slot

@@ -10,6 +10,7 @@
 //     Scene& scene = recorder.scene();
 //     scene.beginFrame(frame, completedFrame);                     // frame numbers of the engine
 //     std::span<JointMatrix> matrices = *scene.writePose(pose);    // for each pose that changes
+//     scene.play(plays);                       // or clips, from which the scene samples the poses
 //     ... add, remove, change ...
 //     recorder.record(commandBuffer);          // or runner.jobs(), or commands.plan() and commit()
 //     draw from the output buffer at scene.output(instance)
@@ -23,6 +24,7 @@
 #include <optional>
 #include <span>
 
+#include "dermis/clips.h"
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
@@ -45,6 +47,8 @@ struct Handle {
 using MeshHandle = Handle<struct MeshOfSystem>;          ///< a mesh
 using PoseHandle = Handle<struct PoseOfSystem>;          ///< a pose
 using InstanceHandle = Handle<struct InstanceOfSystem>;  ///< an instance
+using ClipsHandle = Handle<struct ClipsOfSystem>;        ///< a bank of clips
+using FigureHandle = Handle<struct FigureOfSystem>;      ///< what plays clips
 
 /// How much a buffer holds. It grows if something is added that does not fit.
 struct Capacity {
@@ -60,11 +64,15 @@ struct SceneDescription {
   /// Frames whose fence the engine has not yet waited for when it calls `beginFrame`, the new one
   /// included. At least 1. Ignored by `cpu::SceneRunner`.
   std::uint32_t framesInFlight = 2;
-  Capacity meshCapacity{64 << 10};  ///< bytes of packed meshes; at most a storage buffer range
+  /// Bytes of packed meshes and, unless the CPU executes the frames, of clips; at most a storage
+  /// buffer range.
+  Capacity meshCapacity{64 << 10};
   /// Joints of all poses that the CPU writes. All poses that one call adds are in one buffer, so
   /// some joints of a buffer may stay unused.
   Capacity jointCapacity{256};
-  Capacity gpuJointCapacity{0};  ///< the same for poses that the GPU writes
+  /// The same for poses that the GPU writes. Poses of figures are among them, unless the CPU
+  /// executes the frames.
+  Capacity gpuJointCapacity{0};
   /// Bytes of skinned vertices: the sum of `VertexPlaces::size` and of the gaps for alignment. May
   /// be more than a storage buffer range. Initial and maximum are rounded to multiples of 4.
   Capacity outputCapacity{256 << 10};
@@ -81,6 +89,13 @@ struct PoseOptions {
   /// `markWritten`.
   bool writtenByGpu = false;
   JointPromise promise = JointPromise::scaling;  ///< as `PoseDescription::promise`
+};
+
+/// What a figure plays from now on.
+struct FigurePlay {
+  FigureHandle figure = {};
+  /// As `samplePose` takes them, at most `maxClipLayers`; copied. If there are none, it rests.
+  std::span<const ClipLayer> layers = {};
 };
 
 /// One instance of a scene.
@@ -189,6 +204,7 @@ struct FrameStatistics {
   std::uint32_t instances = 0;  ///< in the scene
   std::uint32_t skinnedInstances = 0;
   std::uint32_t settledInstances = 0;  ///< instances of which only previous positions are written
+  std::uint32_t sampledFigures = 0;    ///< figures whose poses were sampled from clips
   std::uint32_t convertedPoses = 0;    ///< a pose counts once for each form that methods need
   std::uint32_t culledCandidates = 0;  ///< instances that the visibility kernel looks at
   std::uint64_t skinnedVertices = 0;
@@ -256,8 +272,23 @@ class DERMIS_CORE_API Scene {
   /// fails, it adds none.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
-  /// Fails with `invalidArgument` if an instance uses the pose.
+  /// Fails with `invalidArgument` if an instance uses the pose, or if it belongs to a figure.
   Result<void> removePose(PoseHandle pose);
+
+  /// Adds a bank of clips, for any number of figures. The scene keeps its bytes. Fails with
+  /// `limitExceeded` if there is no room on the GPU.
+  Result<ClipsHandle> addClips(PackedClips clips);
+  /// Fails with `invalidArgument` if a figure uses the bank.
+  Result<void> removeClips(ClipsHandle clips);
+  /// Adds a figure, which plays clips of one bank. It has a pose for each skin of the bank, which
+  /// the scene samples. It rests until `play`. Fails with `limitExceeded` if there is no room.
+  Result<FigureHandle> addFigure(ClipsHandle clips);
+  /// Removes a figure and its poses. Fails with `invalidArgument` if an instance uses one of them.
+  Result<void> removeFigure(FigureHandle figure);
+  /// The pose of a figure for a skin of its bank. It has the promise `JointPromise::rigid` if the
+  /// clips cannot scale the joints of the skin, otherwise `scaling`. Fails with `invalidArgument`
+  /// if there is no such skin.
+  Result<PoseHandle> pose(FigureHandle figure, std::uint32_t skin = 0) const;
 
   /// Adds an instance. The next frame skins it. Fails with `invalidArgument` if the description
   /// breaks a rule of `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with
@@ -299,8 +330,16 @@ class DERMIS_CORE_API Scene {
   /// and marks the poses again. Fails as `writePose` does, and for a pose that the CPU writes; the
   /// poses before it in `poses` are then marked.
   Result<void> markWritten(std::span<const PoseHandle> poses);
-  /// `markWritten` for all poses that the GPU writes.
+  /// `markWritten` for all poses that the engine's GPU passes write.
   Result<void> markAllWritten();
+  /// Sets what figures play, at any time. All instances of their poses are skinned again. The next
+  /// frames sample a pose once, when an instance is skinned with it: one that is invisible or not
+  /// due costs nothing, and gets what its figure plays then. Times are wrapped or clamped here
+  /// (`clipTime`).
+  ///
+  /// O(figures × layers). Fails with `invalidArgument` as `samplePose` does. The message names the
+  /// first wrong entry by its index, and nothing changes.
+  Result<void> play(std::span<const FigurePlay> figures);
 
   /// Applies a change. Fails with `invalidArgument` for an update interval of 0, a morph target
   /// that the mesh does not have or that is given twice, and a weight that is not finite; and as
@@ -476,8 +515,9 @@ class DERMIS_CORE_API SceneCommands {
   /// The number of the output buffer as of the last `commit`. It changes when the output grows;
   /// offsets stay the same.
   std::uint32_t outputBuffer() const;
-  /// Where a GPU pass of the engine writes the joint matrices of a pose. The place stays the same
-  /// until the pose is removed. Fails with `invalidArgument` for a pose that the CPU writes.
+  /// Where the joint matrices of a pose are that a GPU pass of the engine writes, or that belongs
+  /// to a figure. The place stays the same until the pose is removed. Fails with `invalidArgument`
+  /// for a pose that the CPU writes.
   Result<BufferPart> posePart(PoseHandle pose) const;
 
  private:

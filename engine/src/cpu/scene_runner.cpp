@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <string>
@@ -62,6 +63,7 @@ struct SceneRunner::State {
   void readBackResults();
   std::span<std::byte> memoryOf(std::uint32_t buffer);
   TaskInstance taskInstance(const Work::Instance& instance, const Group& group);
+  void placeFigures();
   void placeInstances(const Work& work);
   void addGroup(const Group& group, std::uint64_t verticesPerJob);
   void addInstances(const Task& task, std::size_t first, std::size_t count,
@@ -82,6 +84,7 @@ struct SceneRunner::State {
   std::unordered_map<std::uint32_t, Memory> buffers;  ///< by number
   std::span<std::byte> output;                        ///< of the frame
 
+  std::deque<FigureTask> figures;  ///< that the frame samples, and more
   std::vector<TaskInstance> instances;
   std::vector<std::uint32_t> resultOf;  ///< of each instance: index of its result, or `noResult`
   /// A task's result for an instance. Other tasks may skin other vertices of the same instance.
@@ -195,6 +198,7 @@ Result<std::span<const PlannedJob>> SceneRunner::jobs(std::uint32_t verticesPerJ
     std::memcpy(state.output.data() + move.toOffset, state.output.data() + move.fromOffset,
                 static_cast<std::size_t>(move.size));
   }
+  state.placeFigures();
   state.placeInstances(books.work_);
   state.tasks.clear();
   state.extents.clear();
@@ -210,6 +214,19 @@ std::span<const std::byte> SceneRunner::output() const {
   return state_->memoryOf(state_->books().output_);
 }
 
+void SceneRunner::State::placeFigures() {
+  const std::vector<std::uint32_t>& sampling = books().sampling_;
+  while (figures.size() < sampling.size()) figures.emplace_back();
+  for (std::size_t place = 0; place < sampling.size(); ++place) {
+    const SceneFigure& figure = books().figures_.at(sampling[place]);
+    FigureTask& task = figures[place];
+    task.clips = &books().clips_.at(figure.clips.index).content->bank;
+    task.layers = figure.layers;
+    task.matrices = books().matricesOf(figure);
+    task.state.store(FigureTask::State::waiting, std::memory_order_relaxed);
+  }
+}
+
 TaskInstance SceneRunner::State::taskInstance(const Work::Instance& instance, const Group& group) {
   TaskInstance skinned;
   const ScenePose& pose = books().poses_.at(instance.pose);
@@ -217,6 +234,10 @@ TaskInstance SceneRunner::State::taskInstance(const Work::Instance& instance, co
   skinned.mayScale = pose.promise == JointPromise::scaling;
   skinned.restartsMotion = (instance.flags & abi::INSTANCE_RESTARTS) != 0;
   skinned.settles = (instance.flags & abi::INSTANCE_SETTLES) != 0;
+  if (pose.figure != notUsed) {
+    const SceneFigure& figure = books().figures_.at(pose.figure);
+    if (figure.plannedIn == books().planNumber_) skinned.figure = &figures[figure.place];
+  }
   if (instance.extras != nullptr) {
     skinned.morphs = instance.extras->morphs;
     if (instance.extras->hasBox) {

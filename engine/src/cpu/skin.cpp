@@ -124,6 +124,9 @@ Result<void> checkMethod(Method method, const char* subject) {
 }
 
 void skinTask(const Task& task) {
+  for (const TaskInstance& instance : task.instances) {
+    if (instance.figure != nullptr) instance.figure->finish();
+  }
   dispatchTask(task, threadMemory().scratch);
 }
 

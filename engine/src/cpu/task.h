@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "clips/sample.h"
 #include "cpu/mesh_data.h"
 #include "dermis/cpu.h"
 
@@ -28,9 +30,23 @@ struct Scratch {
   std::vector<CacheLine> tile;             ///< what the stages hand to each other
 };
 
+/// A figure, whose poses are sampled by the first task that needs one of them.
+struct FigureTask {
+  enum class State : std::uint32_t { waiting, busy, done };
+
+  const PackedClips* clips = nullptr;
+  PackedLayers layers;
+  std::span<JointMatrix> matrices;  ///< of all skins
+  std::atomic<State> state = State::waiting;
+
+  /// Returns when the poses have been sampled. Any number of threads may call it.
+  void finish();
+};
+
 /// Counterpart of `Instance`.
 struct TaskInstance {
   std::span<const JointMatrix> pose;
+  FigureTask* figure = nullptr;  ///< to be finished before the pose is read
   /// Address of each attribute of the mesh's first vertex, indexed by `Stream`.
   ByStream<std::byte*> outputs{};
   bool mayScale = true;  ///< whether its promise is `JointPromise::scaling`

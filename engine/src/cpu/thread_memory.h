@@ -9,7 +9,8 @@ namespace dermis::cpu {
 
 struct ThreadMemory {
   std::vector<TaskInstance> instances;
-  Scratch scratch[3];  ///< as `dispatchTask` takes it
+  Scratch scratch[3];                ///< as `dispatchTask` takes it
+  std::vector<Affine<float>> nodes;  ///< of a figure
 };
 
 /// That of this thread; it is freed when the thread ends.

@@ -51,6 +51,8 @@ static_assert(sizeof(abi::InfluenceRecord) == abi::INFLUENCE_WORDS * 4);
 static_assert(sizeof(abi::MorphRecord) == abi::MORPH_WORDS * 4 && abi::MORPH_WORDS == 4);
 static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
               abi::MORPH_BLOCK_WORDS == 4);
+static_assert(sizeof(abi::FigureRecord) == abi::FIGURE_WORDS * 4 && abi::FIGURE_WORDS % 4 == 0);
+static_assert(sizeof(abi::StepRecord) == abi::STEP_WORDS * 4 && abi::STEP_WORDS == 4);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
 // Public structures have the layout of the records that kernels write and read.
 static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&
@@ -105,6 +107,8 @@ std::string moduleName(const Variant& variant) {
     return variant.method == Method::logMatrix ? "palette_logarithms" : "palette";
   if (variant.kernel == Kernel::clear) return "clear";
   if (variant.kernel == Kernel::visibility) return "visibility";
+  if (variant.kernel == Kernel::sample) return "sample";
+  if (variant.kernel == Kernel::compose) return "compose";
   std::string name = "skin";
   if (isForComparison(variant.method)) name += "_comparison";
   if (isAgainstBulge(variant.method)) name += "_bulge";
@@ -126,6 +130,8 @@ std::string pipelineName(const Variant& variant) {
                             : "");
   }
   if (variant.kernel == Kernel::clear) return "clear kernel";
+  if (variant.kernel == Kernel::sample) return "kernel that samples clips";
+  if (variant.kernel == Kernel::compose) return "kernel that composes poses";
   if (variant.kernel == Kernel::visibility)
     return "visibility kernel for instances that are culled on the GPU";
   std::string text = "skin kernel for " + std::string(methodName(variant.method)) +

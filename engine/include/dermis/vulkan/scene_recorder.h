@@ -202,17 +202,18 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// the frame in which it grew was abandoned. Offsets stay the same when it grows.
   std::uint64_t outputGeneration() const;
 
-  /// Where a GPU pass of the engine writes the joint matrices of a pose: consecutive `JointMatrix`,
-  /// 48 bytes each. The range stays the same until the pose is removed. Poses of one call of
-  /// `addPoses` are consecutive in one buffer, and the offset of the first is a multiple of
-  /// minStorageBufferOffsetAlignment, so that it can be bound. Poses of different calls may be in
-  /// different buffers. A buffer that the recorder created has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
-  /// and VK_BUFFER_USAGE_TRANSFER_DST_BIT.
+  /// Where the joint matrices of a pose are that a GPU pass of the engine writes, or that belongs
+  /// to a figure: consecutive `JointMatrix`, 48 bytes each. The range stays the same until the pose
+  /// is removed. Poses of one call of `addPoses` are consecutive in one buffer, and the offset of
+  /// the first is a multiple of minStorageBufferOffsetAlignment, so that it can be bound; so is
+  /// that of the first pose of a figure. Poses of different calls may be in different buffers. A
+  /// buffer that the recorder created has VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and those for
+  /// transfers from it and to it.
   ///
   /// The engine records `barrierBetween(Use::dermis, Use::computeWrite)`, as frames in flight may
   /// still read the matrices, then its pass, then `barrierBetween(Use::computeWrite, Use::dermis)`;
-  /// and it calls `Scene::markWritten`. Fails with
-  /// `invalidArgument` for a pose that the CPU writes.
+  /// and it calls `Scene::markWritten`. It only reads the poses of figures, after the commands of a
+  /// frame: as they were last sampled. Fails with `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
 
   /// Of the last frame that was recorded.

@@ -27,7 +27,8 @@ class BankCheck {
         !isSection(header.skins, header.skinCount * std::uint64_t{sizeof(BankSkin) / 4}) ||
         !isSection(header.clips, header.clipCount * std::uint64_t{sizeof(BankClip) / 4}) ||
         !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
-        header.clipCount > maxClips || header.maskCount > maxMasks)
+        header.clipCount > maxClips || header.maskCount > maxMasks || header.nodes % 4 != 0 ||
+        header.clips % 4 != 0)
       return damaged("its header does not fit its sections");
     for (std::size_t i = 0; i < nodes; ++i) {
       if (!isNode(i)) return damaged("node " + std::to_string(i) + " is not valid");
@@ -57,11 +58,12 @@ class BankCheck {
     const BankNode node = bank_.node(index);
     const std::size_t record = bank_.header.nodes + index * sizeof(BankNode) / 4;
     return (node.parent == noNode || node.parent < index) && areFinite(record + 3, 13) &&
-           (node.fixed == 0 || areFinite(node.fixed, 12));
+           (node.fixed == 0 || (node.fixed % 4 == 0 && areFinite(node.fixed, 12)));
   }
 
   bool isSkin(const BankSkin& skin) const {
-    if (skin.jointCount > maxPoseJoints || !isSection(skin.nodes, skin.jointCount) ||
+    if (skin.jointCount == 0 || skin.jointCount > maxPoseJoints || skin.matrices % 4 != 0 ||
+        !isSection(skin.nodes, skin.jointCount) ||
         !areFinite(skin.matrices, std::uint64_t{12} * skin.jointCount))
       return false;
     for (std::size_t joint = 0; joint < skin.jointCount; ++joint) {
@@ -103,7 +105,7 @@ class BankCheck {
     const std::uint64_t tracks = std::uint64_t{3} * bank_.header.nodeCount;
     if (!std::isfinite(clip.duration) || clip.duration < 0 || !std::isfinite(clip.rate) ||
         clip.rate < 0 || clip.flags > 3 || clip.classCount > 256 ||
-        !std::isfinite(clip.duration * clip.rate) ||
+        !std::isfinite(clip.duration * clip.rate) || clip.classes % 4 != 0 ||
         !isSection(clip.classes, clip.classCount * std::uint64_t{sizeof(BankClass) / 4}) ||
         !isSection(clip.tracks, tracks))
       return false;

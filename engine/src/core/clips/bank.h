@@ -9,6 +9,7 @@
 #include <cstring>
 #include <span>
 
+#include "abi.h"
 #include "dermis/clips.h"
 
 namespace dermis {
@@ -191,6 +192,11 @@ struct ClipBank {
   template <typename Record>
   static constexpr std::size_t wordsOf = sizeof(Record) / 4;
 };
+static_assert(offsetof(BankHeader, nodes) == abi::CLIPS_OFFSETS * 4 &&
+              sizeof(BankNode) == abi::CLIP_NODE_WORDS * 4 &&
+              sizeof(BankClip) == abi::CLIP_WORDS * 4 &&
+              sizeof(BankClass) == abi::CLIP_CLASS_WORDS * 4 &&
+              trackColumnBits == abi::TRACK_COLUMN_BITS);
 static_assert(sizeof(BankHeader) == 64 && sizeof(BankNode) == 64 && sizeof(BankSkin) == 16 &&
               sizeof(BankClip) == 32 && sizeof(BankClass) == 32);
 

@@ -65,8 +65,13 @@ class BankWriter {
     words_.resize(words_.size() + count);
     return offset;
   }
+  /// At a multiple of four words, which kernels read at once.
+  std::uint32_t reserveUnits(std::size_t count) {
+    words_.resize((words_.size() + 3) / 4 * 4);
+    return reserve(count);
+  }
   std::uint32_t append(const Transform& transform) {
-    const std::uint32_t offset = reserve(12);
+    const std::uint32_t offset = reserveUnits(12);
     for (std::size_t i = 0; i < 12; ++i)
       words_[offset + i] =
           std::bit_cast<std::uint32_t>(static_cast<float>(transform[i / 4][i % 4]));
@@ -93,7 +98,7 @@ class BankWriter {
     record.nodes = reserve(skin.joints.size());
     for (std::size_t i = 0; i < skin.joints.size(); ++i)
       words_[record.nodes + i] = parts_.hanging[skin.joints[i]].node;
-    record.matrices = static_cast<std::uint32_t>(words_.size());
+    record.matrices = reserveUnits(0);
     for (std::size_t i = 0; i < skin.joints.size(); ++i)
       append(multiply(parts_.hanging[skin.joints[i]].fixed, skin.inverseBind[i].m));
     put(offset, record);
@@ -132,7 +137,7 @@ class BankWriter {
       }
     }
     record.classCount = static_cast<std::uint32_t>(classes.size());
-    record.classes = reserve(classes.size() * sizeof(BankClass) / 4);
+    record.classes = reserveUnits(classes.size() * sizeof(BankClass) / 4);
     std::uint32_t classNumber = 0;
     for (const auto& [kind, columns] : classes) {
       writeClass(record.classes + 8 * std::size_t{classNumber}, std::get<int>(kind) - finest,

@@ -50,6 +50,7 @@ Result<void> checkSkins(const Skeleton& skeleton) {
   for (std::size_t i = 0; i < skeleton.skins.size(); ++i) {
     const SkeletonSkin& skin = skeleton.skins[i];
     const std::string title = titled("skin", i, skin.name);
+    if (skin.joints.empty()) return invalid(title + " has no joints");
     if (skin.joints.size() > maxPoseJoints)
       return exceeded(title + " has " + std::to_string(skin.joints.size()) + " joints");
     if (skin.joints.size() != skin.inverseBind.size()) {

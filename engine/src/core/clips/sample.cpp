@@ -1,5 +1,7 @@
 // Samples poses of a bank in float32, operation by operation, so that every processor gets the same
 // bits.
+#include "clips/sample.h"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,9 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "affine.h"
-#include "clips/bank.h"
-#include "dermis/clips.h"
+#include "attribute.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
@@ -157,51 +157,60 @@ void add(Local& local, const Local& difference, float weight) {
   }
 }
 
-/// The nearest float16, as float32; infinite above its range. Ties go to the even one.
-float roundedToHalf(float value) {
-  if (!(std::abs(value) < 65520))
-    return std::copysign(std::numeric_limits<float>::infinity(), value);
-  const int exponent = std::max(std::ilogb(value == 0 ? 1.0f : value), -14);
-  const float step = std::ldexp(1.0f, exponent - 10);
-  return std::nearbyint(value / step) * step;
-}
-
-Error refused(std::size_t layer, const std::string& what) {
-  return {ErrorCode::invalidArgument, "samplePose: layer " + std::to_string(layer) + ": " + what};
-}
-
-Result<std::vector<Layer>> resolve(const PackedClips& clips, const ClipBank& bank,
-                                   std::span<const ClipLayer> layers) {
-  if (layers.size() > maxClipLayers) {
-    return Error{ErrorCode::invalidArgument,
-                 "samplePose: there are " + std::to_string(layers.size()) +
-                     " layers, but at most " + std::to_string(maxClipLayers) + " are allowed"};
-  }
-  std::vector<Layer> result;
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const ClipLayer& layer = layers[i];
-    if (layer.clip >= bank.header.clipCount) {
-      return refused(i, "there is no clip " + std::to_string(layer.clip) + "; the bank has " +
-                            std::to_string(bank.header.clipCount));
-    }
-    if (layer.mask > bank.header.maskCount) {
-      return refused(i, "there is no mask " + std::to_string(layer.mask) + "; the bank has " +
-                            std::to_string(bank.header.maskCount));
-    }
-    if (!std::isfinite(layer.time)) return refused(i, "its time is not finite");
-    if (!std::isfinite(layer.weight)) return refused(i, "its weight is not finite");
-    const float weight = roundedToHalf(layer.weight);
-    if (!std::isfinite(weight)) return refused(i, "its weight is too large for float16");
-    const ClipInfo info = clips.clip(layer.clip);
-    if (weight < 0 && !info.additive)
-      return refused(i, "its weight is negative, and its clip is not additive");
-    result.push_back(
-        {bank.clip(layer.clip), clipTime(info, layer.time, layer.hold), weight, layer.mask});
-  }
-  return result;
+/// The bits of the nearest float16. Ties go to the even one. Infinite above its range.
+std::uint16_t toHalf(float value) {
+  const std::uint32_t sign = std::signbit(value) ? 0x8000u : 0u;
+  const float size = std::abs(value);
+  if (!(size < 65520)) return static_cast<std::uint16_t>(sign | 0x7c00u);
+  // A step is 2^-24 below 2^-14, and 2^-10 of the largest power of two below `size` above.
+  const int exponent = size == 0 ? -14 : std::max(std::ilogb(size), -14);
+  const auto steps = static_cast<std::uint32_t>(std::nearbyint(std::ldexp(size, 10 - exponent)));
+  // 1024 steps and more are a normal number, whose exponent they raise.
+  return static_cast<std::uint16_t>(sign |
+                                    (static_cast<std::uint32_t>(exponent + 14) * 1024 + steps));
 }
 
 }  // namespace
+
+Result<PackedLayers> packLayers(const PackedClips& clips, std::span<const ClipLayer> layers,
+                                const char* subject) {
+  const auto refused = [subject](const std::string& what) {
+    return Error{ErrorCode::invalidArgument, subject + what};
+  };
+  if (layers.size() > maxClipLayers) {
+    return refused("there are " + std::to_string(layers.size()) + " layers, but at most " +
+                   std::to_string(maxClipLayers) + " are allowed");
+  }
+  const ClipBank bank(clips);
+  PackedLayers result;
+  std::array<PackedLayer, maxClipLayers> additive;
+  std::uint32_t additives = 0;
+  for (const ClipLayer& layer : layers) {
+    const auto wrong = [&](const std::string& what) {
+      return refused("layer " + std::to_string(&layer - layers.data()) + ": " + what);
+    };
+    if (layer.clip >= bank.header.clipCount) {
+      return wrong("there is no clip " + std::to_string(layer.clip) + "; the bank has " +
+                   std::to_string(bank.header.clipCount));
+    }
+    if (layer.mask > bank.header.maskCount) {
+      return wrong("there is no mask " + std::to_string(layer.mask) + "; the bank has " +
+                   std::to_string(bank.header.maskCount));
+    }
+    if (!std::isfinite(layer.time)) return wrong("its time is not finite");
+    if (!std::isfinite(layer.weight)) return wrong("its weight is not finite");
+    const std::uint32_t weight = toHalf(layer.weight);
+    if ((weight & 0x7c00) == 0x7c00) return wrong("its weight is too large for float16");
+    const ClipInfo info = clips.clip(layer.clip);
+    if (layer.weight < 0 && weight != 0x8000 && !info.additive)
+      return wrong("its weight is negative, and its clip is not additive");
+    PackedLayer& place = info.additive ? additive[additives++] : result.layers[result.count++];
+    place = {clipTime(info, layer.time, layer.hold), layer.clip | layer.mask << 10 | weight << 16};
+  }
+  std::copy_n(additive.begin(), additives, result.layers.begin() + result.count);
+  result.count += additives;
+  return result;
+}
 
 float clipTime(const ClipInfo& info, double seconds, bool hold) {
   const double duration = double{info.duration};
@@ -214,31 +223,22 @@ float clipTime(const ClipInfo& info, double seconds, bool hold) {
   return static_cast<float>(std::clamp(time, 0.0, duration));
 }
 
-Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> layers,
-                        std::uint32_t skinNumber, std::span<JointMatrix> pose) {
+void sampleNodes(const PackedClips& clips, const PackedLayers& packed,
+                 std::span<Affine<float>> globals) {
   const ClipBank bank(clips);
-  if (skinNumber >= bank.header.skinCount) {
-    return Error{ErrorCode::invalidArgument, "samplePose: there is no skin " +
-                                                 std::to_string(skinNumber) + "; the bank has " +
-                                                 std::to_string(bank.header.skinCount)};
+  std::array<Layer, maxClipLayers> storage;
+  for (std::uint32_t i = 0; i < packed.count; ++i) {
+    const PackedLayer& layer = packed.layers[i];
+    storage[i] = {bank.clip(layer.clip()), layer.time, fromHalf(layer.weight()), layer.mask()};
   }
-  const BankSkin skin = bank.skin(skinNumber);
-  if (pose.size() != skin.jointCount) {
-    return Error{ErrorCode::invalidArgument,
-                 "samplePose: the pose has " + std::to_string(pose.size()) + " joints, but skin " +
-                     std::to_string(skinNumber) + " has " + std::to_string(skin.jointCount)};
-  }
-  const Result<std::vector<Layer>> resolved = resolve(clips, bank, layers);
-  if (!resolved) return resolved.error();
-
-  std::vector<Affine<float>> globals(bank.header.nodeCount);
+  const std::span<const Layer> layers = std::span(storage).first(packed.count);
   for (std::size_t i = 0; i < globals.size(); ++i) {
     const BankNode node = bank.node(i);
     const Local rest{vectorFrom(node.translation),
                      {node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]},
                      vectorFrom(node.scale)};
-    Local local = blend(bank, *resolved, i, rest);
-    for (const Layer& layer : *resolved) {
+    Local local = blend(bank, layers, i, rest);
+    for (const Layer& layer : layers) {
       if (isAdditive(layer)) {
         add(local, sampleLocal(bank, layer, i, noDifference),
             layer.weight * bank.mask(layer.mask, i));
@@ -248,12 +248,37 @@ Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> lay
     if (node.fixed != 0) matrix = multiply(bank.at<Affine<float>>(node.fixed), matrix);
     globals[i] = node.parent == noNode ? matrix : multiply(globals[node.parent], matrix);
   }
+}
+
+void poseSkin(const PackedClips& clips, std::uint32_t number,
+              std::span<const Affine<float>> globals, std::span<JointMatrix> pose) {
+  const ClipBank bank(clips);
+  const BankSkin skin = bank.skin(number);
   for (std::size_t joint = 0; joint < pose.size(); ++joint) {
     const auto matrix = bank.at<Affine<float>>(skin.matrices + 12 * joint);
     const std::uint32_t node = bank.words[skin.nodes + joint];
     pose[joint] =
         std::bit_cast<JointMatrix>(node == noNode ? matrix : multiply(globals[node], matrix));
   }
+}
+
+Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> layers,
+                        std::uint32_t skin, std::span<JointMatrix> pose) {
+  if (skin >= clips.skinCount()) {
+    return Error{ErrorCode::invalidArgument, "samplePose: there is no skin " +
+                                                 std::to_string(skin) + "; the bank has " +
+                                                 std::to_string(clips.skinCount())};
+  }
+  if (pose.size() != clips.jointCount(skin)) {
+    return Error{ErrorCode::invalidArgument,
+                 "samplePose: the pose has " + std::to_string(pose.size()) + " joints, but skin " +
+                     std::to_string(skin) + " has " + std::to_string(clips.jointCount(skin))};
+  }
+  const Result<PackedLayers> packed = packLayers(clips, layers, "samplePose: ");
+  if (!packed) return packed.error();
+  std::vector<Affine<float>> globals(clips.nodeCount());
+  sampleNodes(clips, *packed, globals);
+  poseSkin(clips, skin, globals, pose);
   return {};
 }
 

@@ -67,6 +67,7 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   plan.sizes = sizes;
   dispatches_.clear();
   if (work.isEmpty()) return {};
+  if (Result<void> good = addFigureDispatches(); !good) return good;
   if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
@@ -117,6 +118,50 @@ Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgrou
   return {};
 }
 
+/// One workgroup per figure: a dispatch that samples the nodes, then one for each band of them.
+Result<void> Encoder::addFigureDispatches() {
+  paletteStage_ = 0;
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  std::uint32_t record = 0;  // they begin the tables
+  for (const Work::Figures& figures : work_->figures) {
+    const std::uint32_t first = wordsOf(tables);
+    tables.resize(first + figures.records.size() * abi::FIGURE_WORDS);
+    std::memcpy(&tables[first], figures.records.data(), std::span(figures.records).size_bytes());
+    const abi::SamplePush push{first, 0, figures.bank, figures.clips->nodeCount};
+    if (Result<void> good =
+            addDispatch(variantOf(Kernel::sample, limits_, tuning_), figures.records.size(), push);
+        !good)
+      return good;
+    paletteStage_ =
+        std::max(paletteStage_, static_cast<std::uint32_t>(figures.clips->bandEnds.size()) + 1);
+  }
+  for (std::uint32_t band = 0; band + 1 < paletteStage_; ++band) {
+    record = 0;
+    for (const Work::Figures& figures : work_->figures) {
+      const DeviceClips& clips = *figures.clips;
+      const std::uint32_t first = record;
+      record += static_cast<std::uint32_t>(figures.records.size() * abi::FIGURE_WORDS);
+      if (band >= clips.bandEnds.size()) continue;
+      const std::uint32_t begin = band == 0 ? 0 : clips.bandEnds[band - 1];
+      const abi::ComposePush push{first,
+                                  0,
+                                  figures.bank,
+                                  figures.kernelWords,
+                                  figures.kernelWords + clips.firstStep + begin * abi::STEP_WORDS,
+                                  clips.bandEnds[band] - begin};
+      if (Result<void> good = addDispatch(variantOf(Kernel::compose, limits_, tuning_),
+                                          figures.records.size(), push);
+          !good)
+        return good;
+      Dispatch& dispatch = dispatches_.back();
+      dispatch.stage = band + 1;
+      dispatch.joints = BufferRole::gpuPoses;
+      dispatch.poseBuffer = figures.poseBuffer;
+    }
+  }
+  return {};
+}
+
 Result<void> Encoder::addPaletteDispatches() {
   for (std::uint32_t buffer = 0; buffer < work_->poses.size(); ++buffer) {
     const Work::Poses& lists = work_->poses[buffer];
@@ -144,6 +189,7 @@ Result<void> Encoder::addPaletteDispatch(const Variant& variant,
   std::memcpy(&tables[first], records.data(), records.size_bytes());
   if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0}); !good)
     return good;
+  dispatches_.back().stage = paletteStage_;
   dispatches_.back().joints = joints;
   dispatches_.back().poseBuffer = buffer;
   return {};
@@ -254,8 +300,8 @@ Result<void> Encoder::addDispatches() {
     const bool readsPoses = variant.method == Method::linear && !plan_->sizes.isScene;
     dispatch.joints = readsPoses ? BufferRole::poses : BufferRole::palettes;
     // A kernel that may name the results counts as one that reads them.
-    dispatch.isAfterPalettes =
-        palettesRun && (!readsPoses || variant.motion || hasResults(variant));
+    if (palettesRun && (!readsPoses || variant.motion || hasResults(variant)))
+      dispatch.stage = paletteStage_ + 1;
     begin = end;
   }
   return {};
@@ -461,7 +507,7 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   };
   const BufferPart& tables = buffers[BufferRole::tables];
   const BufferPart& results = buffers[BufferRole::results];
-  const bool readsPoses = dispatch.joints != BufferRole::palettes;
+  const bool readsPoses = dispatch.joints != BufferRole::palettes;  // or writes them
   const BufferPart& joints = readsPoses && !buffers.poses.empty()
                                  ? buffers.poses[dispatch.poseBuffer]
                                  : buffers[dispatch.joints];
@@ -492,6 +538,10 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     // Not an output: the validation layer would report results that are read there and that another
     // dispatch wrote.
     parts[abi::BINDING_RESULTS] = orElse(results, tables);
+  } else if (variant.kernel == Kernel::sample || variant.kernel == Kernel::compose) {
+    parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
+    parts[abi::BINDING_PALETTES] = buffers[BufferRole::palettes];
+    if (readsPoses) parts[abi::BINDING_POSITIONS] = joints;
   } else {
     const BufferPart& palettes = buffers[BufferRole::palettes];
     parts[abi::BINDING_MESHES] =
@@ -523,11 +573,11 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
 }
 
 void Encoder::listDispatches(const PlanBuffers& buffers) {
-  bool palettesAreVisible = false;
+  std::uint32_t stage = 0;
   for (const Dispatch& dispatch : dispatches_) {
-    if (dispatch.isAfterPalettes && !palettesAreVisible) {
+    if (dispatch.stage > stage) {
       plan_->commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
-      palettesAreVisible = true;
+      stage = dispatch.stage;
     }
     listDispatch(dispatch, buffers);
   }

@@ -40,14 +40,15 @@ class Encoder {
   struct Dispatch {
     DispatchCommand command;
     Variant variant;
-    /// It reads what the palette kernel writes, or adds to results that the clear kernel clears.
-    bool isAfterPalettes = false;
+    /// It reads what dispatches of lower stages write. Results are cleared in stage 0.
+    std::uint32_t stage = 0;
     BufferRole joints = BufferRole::palettes;  ///< that the kernel reads
-    std::uint32_t poseBuffer = 0;              ///< of the palette kernel of a scene
+    std::uint32_t poseBuffer = 0;              ///< of the palette and compose kernels of a scene
     ByStream<std::uint32_t> windows{};
     std::uint32_t instancesPerInvocation = 0;  ///< at most; of a skin kernel
   };
 
+  Result<void> addFigureDispatches();
   Result<void> addPaletteDispatches();
   Result<void> addPaletteDispatch(const Variant& variant,
                                   std::span<const abi::PaletteRecord> records, BufferRole joints,
@@ -73,6 +74,7 @@ class Encoder {
   const Work* work_ = nullptr;
   DeviceLimits limits_;
   Tuning tuning_;
+  std::uint32_t paletteStage_ = 0;           ///< of the palette kernel
   std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
   std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records

@@ -310,6 +310,9 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
         paletteVariant(PaletteForm::matrices, JointPromise::scaling, limits, tuning));
   // `placeVertices` aligns what it places.
   appendForms(layoutVariant(job, limits, tuning), ranges, variants);
+  for (const Kernel kernel : {Kernel::sample, Kernel::compose}) {
+    if (needs.figures) variants.push_back(variantOf(kernel, limits, tuning));
+  }
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));
   return idsOf(variants);
 }

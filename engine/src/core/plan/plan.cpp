@@ -94,7 +94,7 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
       if (isScene) return {poses, alignment, storage | copiedTo};
       return {poses, alignment, read | copiedTo};
     case BufferRole::gpuPoses:
-      if (isScene) return {gpuPoses, alignment, storage | copiedTo};
+      if (isScene) return {gpuPoses, alignment, written};
       break;
     case BufferRole::tables:
       if (isScene) return {tables, alignment, read | copiedTo | indirect};

@@ -25,7 +25,7 @@ void visitFields(AnyVariant& variant, const Field& field) {
   field(variant.normals, 4);
   field(variant.positions, 4);
   field(variant.method, 4);
-  field(variant.kernel, 2);
+  field(variant.kernel, 3);
 }
 
 }  // namespace

@@ -19,6 +19,8 @@ enum class Kernel : std::uint8_t {
   skin = 1,        ///< skins instances
   visibility = 2,  ///< in a scene: chooses which of the instances culled on the GPU are skinned
   clear = 3,       ///< clears the results of instances that are skinned
+  sample = 4,      ///< in a scene: samples the local transforms of figures from clips
+  compose = 5,     ///< in a scene: makes the poses of figures from these
 };
 
 /// One specialization of a kernel, from which one pipeline is built.

@@ -26,11 +26,23 @@ void Work::begin(Groups& groupsInUse) {
       for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
     }
   }
+  figures.clear();
   poseCount = 0;
   clearedResults.clear();
   instances.clear();
   culled.clear();
   groups.clear();
+}
+
+void Work::addFigure(const Figures& figure, const abi::FigureRecord& record) {
+  // Mostly that of the figure before.
+  auto entry = std::ranges::find_if(figures, [&](const Figures& other) {
+    return other.clips == figure.clips && other.poseBuffer == figure.poseBuffer;
+  });
+  if (entry == figures.end())
+    entry = figures.insert(figures.end(),
+                           {figure.clips, figure.bank, figure.kernelWords, figure.poseBuffer, {}});
+  entry->records.push_back(record);
 }
 
 void Work::startGroup(Groups::Entry& entry) {

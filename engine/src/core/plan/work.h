@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "clips/device_clips.h"
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
 #include "plan/groups.h"
@@ -61,6 +62,14 @@ struct Work {
     std::array<std::array<std::vector<abi::PaletteRecord>, jointPromiseCount>, paletteFormCount>
         records;
   };
+  /// Figures of one bank whose poses are in one buffer.
+  struct Figures {
+    const DeviceClips* clips;
+    std::uint32_t bank;         ///< word of the mesh buffer
+    std::uint32_t kernelWords;  ///< the same of `DeviceClips::words`
+    std::uint32_t poseBuffer;
+    std::vector<abi::FigureRecord> records;
+  };
   struct Instance {
     const PlacedRun* run;
     const InstanceExtras* extras;  ///< null if it has none
@@ -73,7 +82,8 @@ struct Work {
     Candidate candidate;
   };
 
-  std::vector<Poses> poses;  ///< by pose buffer
+  std::vector<Figures> figures;  ///< whose poses are sampled before they are converted
+  std::vector<Poses> poses;      ///< by pose buffer
   std::uint32_t poseCount = 0;
   std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
   std::vector<Instance> instances;            ///< in the order in which they were added
@@ -83,6 +93,8 @@ struct Work {
   /// output window each, culled or not.
   std::vector<std::uint32_t> order;
 
+  /// `figure.records` is not read.
+  void addFigure(const Figures& figure, const abi::FigureRecord& record);
   void begin(Groups& groupsInUse);
   bool isEmpty() const { return poseCount == 0 && clearedResults.empty() && instances.empty(); }
 

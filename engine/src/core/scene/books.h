@@ -11,6 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "clips/device_clips.h"
+#include "clips/sample.h"
+#include "dermis/clips.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/scene.h"
@@ -94,8 +97,9 @@ struct ScenePose {
   std::uint32_t jointCount = 0;
   JointPromise promise = JointPromise::scaling;
   bool writtenByGpu = false;
-  std::uint32_t buffer = 0;  ///< its number
-  Range joints;              ///< in that buffer, of all slots together
+  std::uint32_t figure = notUsed;  ///< to which it belongs
+  std::uint32_t buffer = 0;        ///< its number
+  Range joints;                    ///< in that buffer, of all slots together
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
   /// flight.
   std::uint32_t slot = 0;
@@ -105,6 +109,38 @@ struct ScenePose {
   std::array<Form, paletteFormCount> forms;
   std::uint32_t users = 0;
   std::uint32_t firstInstance = notUsed;  ///< of the linked list of its instances
+};
+
+struct SceneClips {
+  /// Its address stays the same.
+  struct Content {
+    PackedClips bank;
+    DeviceClips device;
+    std::vector<bool> isRigid;  ///< of each skin
+  };
+
+  std::unique_ptr<const Content> content;
+  Range bytes;  ///< in the mesh buffer: of the bank, then of `device`
+  std::uint32_t users = 0;
+
+  /// Of `device`, in the mesh buffer: at a whole unit.
+  std::uint64_t deviceOffset() const {
+    return bytes.offset + (content->bank.bytes().size() + unitBytes - 1) / unitBytes * unitBytes;
+  }
+};
+
+struct SceneFigure {
+  ClipsHandle clips;
+  std::vector<PoseHandle> poses;  ///< for each skin of the bank; their matrices are consecutive
+  std::uint32_t buffer = 0;       ///< of the poses
+  Range joints;                   ///< the same, of all slots together
+  Range matrices;                 ///< those of the kernels, in palette units
+  PackedLayers layers;
+  std::uint64_t version = 1;    ///< of `layers`
+  std::uint64_t sampled = 0;    ///< the version that the poses have; 0: to be sampled again
+  std::uint64_t plannedIn = 0;  ///< the plan that samples it …
+  std::uint32_t place = 0;      ///< … and its place among those that the plan samples
+  std::uint64_t listedIn = 0;   ///< the plan before which its poses were listed as written
 };
 
 /// Where an instance's vertices are, or will be.
@@ -232,6 +268,7 @@ struct SceneBooks {
   DERMIS_CORE_API Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
   Result<void> checkWrite(PoseHandle handle, bool writtenByGpu) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
+  void dropPose(PoseHandle handle);
   /// Where the matrices of the current slot are in the buffer of the pose.
   std::uint64_t offsetOf(const ScenePose& pose) const {
     return (pose.joints.offset + std::uint64_t{pose.slot} * pose.jointCount) * sizeof(JointMatrix);
@@ -240,10 +277,16 @@ struct SceneBooks {
   DERMIS_CORE_API Result<BufferPart> posePart(PoseHandle pose) const;
   /// The memory that the CPU writes.
   DERMIS_CORE_API std::span<JointMatrix> matricesOf(const ScenePose& pose);
+  /// The same of all poses of a figure; those of a scene on the CPU.
+  DERMIS_CORE_API std::span<JointMatrix> matricesOf(const SceneFigure& figure);
   void upload(PoseHandle pose) {
     if (poseBuffers_[poses_.at(pose.index).buffer].buffer.mapped == nullptr)
       poseUploads_.push_back(pose);
   }
+
+  // figures.cpp
+  void sampleFigure(std::uint32_t index);
+  void gatherFigures();
 
   // stores.cpp
   Result<void> createFirstBuffers();
@@ -332,6 +375,8 @@ struct SceneBooks {
   SlotMap<SceneMesh, MeshHandle> meshes_;
   SlotMap<ScenePose, PoseHandle> poses_;
   SlotMap<SceneInstance, InstanceHandle> instances_;
+  SlotMap<SceneClips, ClipsHandle> clips_;
+  SlotMap<SceneFigure, FigureHandle> figures_;
   std::vector<InstanceState> states_;  ///< of each instance, by index
   Store meshStore_, unitStore_, outputStore_, resultStore_;
   GrowingBuffer history_;
@@ -350,7 +395,8 @@ struct SceneBooks {
   };
   std::vector<MeshUpload> meshUploads_;     ///< of the next frame …
   std::vector<MeshUpload> uploadedMeshes_;  ///< … and of the last, as long as it may be abandoned
-  std::vector<PoseHandle> poseUploads_, uploadedPoses_;  ///< the same
+  std::vector<PoseHandle> poseUploads_, uploadedPoses_;   ///< the same
+  std::vector<ClipsHandle> clipUploads_, uploadedClips_;  ///< the same
 
   std::uint64_t frame_ = 0, completed_ = 0;
   std::uint64_t record_ = 0;         ///< the last that was committed
@@ -361,6 +407,7 @@ struct SceneBooks {
   std::uint32_t nextVersion_ = 0;
   std::vector<PlacedRun> runsScratch_;
   std::vector<MorphWeight> morphsScratch_;
+  std::vector<PackedLayers> layersScratch_;
 
   std::vector<PoseHandle> posed_;         ///< written since the last plan
   std::vector<InstanceHandle> pending_;   ///< stale, visible, and not culled
@@ -387,6 +434,7 @@ struct SceneBooks {
     std::size_t form;
   };
   std::vector<Conversion> conversions_;
+  std::vector<std::uint32_t> sampling_;  ///< figures
   std::vector<CopyCommand> moves_;
   std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
   std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them

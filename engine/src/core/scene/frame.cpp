@@ -44,6 +44,7 @@ void SceneBooks::convertPalette(const SceneInstance& instance) {
   ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
+  if (pose.figure != notUsed) sampleFigure(pose.figure);
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
   const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                           pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
@@ -202,6 +203,7 @@ Result<void> SceneBooks::gather() {
   settling_.clear();
   versioned_.clear();
   conversions_.clear();
+  sampling_.clear();
   moves_.clear();
   plannedResults_.clear();
   resultCopies_.clear();
@@ -212,6 +214,7 @@ Result<void> SceneBooks::gather() {
   gatherPending();
   gatherSettling();
   gatherCulled();
+  gatherFigures();
   gatherResults();
   work_.arrange();
   for (const Conversion& conversion : conversions_) {
@@ -222,6 +225,7 @@ Result<void> SceneBooks::gather() {
   planned_.instances = instances_.size();
   planned_.skinnedInstances = static_cast<std::uint32_t>(due_.size());
   planned_.settledInstances = static_cast<std::uint32_t>(settling_.size());
+  planned_.sampledFigures = static_cast<std::uint32_t>(sampling_.size());
   planned_.convertedPoses = work_.poseCount;
   planned_.culledCandidates = static_cast<std::uint32_t>(work_.culled.size());
   isPlanned_ = true;
@@ -242,6 +246,15 @@ void SceneBooks::listUploads() {
     const Range& bytes = meshes_.at(upload.mesh.index).bytes;
     uploads_.push_back(
         {{meshStore_.buffer.now.number, bytes.offset, bytes.size}, upload.bytes.bytes()});
+  }
+  for (const ClipsHandle handle : clipUploads_) {
+    const SceneClips* clips = clips_.find(handle);
+    if (clips == nullptr) continue;
+    const std::span<const std::byte> bank = clips->content->bank.bytes();
+    const auto words = std::as_bytes(std::span(clips->content->device.words));
+    const std::uint32_t meshes = meshStore_.buffer.now.number;
+    uploads_.push_back({{meshes, clips->bytes.offset, bank.size()}, bank});
+    if (!words.empty()) uploads_.push_back({{meshes, clips->deviceOffset(), words.size()}, words});
   }
   for (const PoseHandle handle : poseUploads_) {
     ScenePose* pose = poses_.find(handle);
@@ -331,12 +344,18 @@ Result<void> SceneBooks::commit() {
   meshUploads_.clear();
   uploadedPoses_.swap(poseUploads_);
   poseUploads_.clear();
+  uploadedClips_.swap(clipUploads_);
+  clipUploads_.clear();
   skinned_.clear();
   settled_.clear();
   moving_.clear();
   for (const Conversion& conversion : conversions_) {
     ScenePose& pose = poses_.at(conversion.pose.index);
     pose.forms[conversion.form].version = pose.version;
+  }
+  for (const std::uint32_t index : sampling_) {
+    SceneFigure& figure = figures_.at(index);
+    figure.sampled = figure.version;
   }
   for (const auto& [index, restarts] : due_) {
     InstanceState& state = states_[index];
@@ -400,6 +419,8 @@ void SceneBooks::abandon() {
   for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
     for (ScenePose::Form& form : poses_.at(index).forms) form.version = 0;
   }
+  for (std::uint32_t index = 0; index < figures_.capacity(); ++index)
+    figures_.at(index).sampled = 0;
   clearHistory_ = 0;
   for (GrowingBuffer* buffer : keptBuffers()) {
     if (!buffer->copied.exists()) continue;
@@ -414,6 +435,8 @@ void SceneBooks::abandon() {
   uploadedMeshes_.clear();
   poseUploads_.insert(poseUploads_.end(), uploadedPoses_.begin(), uploadedPoses_.end());
   uploadedPoses_.clear();
+  clipUploads_.insert(clipUploads_.end(), uploadedClips_.begin(), uploadedClips_.end());
+  uploadedClips_.clear();
   skinned_.clear();
   settled_.clear();
   committed_ = {};
@@ -449,6 +472,7 @@ void SceneBooks::begin(std::uint64_t frame, std::uint64_t completedFrame) {
   mayAbandon_ = false;
   uploadedMeshes_.clear();
   uploadedPoses_.clear();
+  uploadedClips_.clear();
   for (GrowingBuffer* buffer : keptBuffers())
     retire(std::exchange(buffer->copied, SceneBufferMemory()));
   frame_ = frame;

@@ -12,15 +12,13 @@
 namespace dermis {
 namespace {
 
-Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users) {
-  return {ErrorCode::invalidArgument, std::string(kind) + " " + std::to_string(index) +
-                                          " is used by " + std::to_string(users) + " instance" +
-                                          (users == 1 ? "" : "s")};
+Error ofFigure(PoseHandle handle, const ScenePose& pose) {
+  return {ErrorCode::invalidArgument, "pose " + std::to_string(handle.index) +
+                                          " belongs to figure " + std::to_string(pose.figure) +
+                                          ", for which the scene samples it"};
 }
 
 }  // namespace
-
-// -- Meshes and poses.
 
 Result<MeshHandle> Scene::addMesh(PackedMesh mesh) {
   return changed().addMesh(mesh.info(), &mesh);
@@ -102,15 +100,22 @@ Result<void> Scene::removePose(PoseHandle handle) {
   const ScenePose* pose = books.poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->users != 0) return isUsed("pose", handle.index, pose->users);
+  if (pose->figure != notUsed) return ofFigure(handle, *pose);
   books.retire(books.poseBuffers_[pose->buffer].joints, pose->joints);
-  for (std::size_t form = 0; form < paletteFormCount; ++form) {
-    const std::uint32_t unit = pose->forms[form].unit;
-    if (unit == notUsed) continue;
-    books.retire(books.unitStore_.ranges, {unit, paletteSize(static_cast<PaletteForm>(form),
-                                                             pose->jointCount, pose->promise)});
-  }
-  books.poses_.remove(handle);
+  books.dropPose(handle);
   return {};
+}
+
+/// Of one that no instance uses. The caller retires its joints.
+void SceneBooks::dropPose(PoseHandle handle) {
+  const ScenePose& pose = poses_.at(handle.index);
+  for (std::size_t form = 0; form < paletteFormCount; ++form) {
+    const std::uint32_t unit = pose.forms[form].unit;
+    if (unit == notUsed) continue;
+    retire(unitStore_.ranges,
+           {unit, paletteSize(static_cast<PaletteForm>(form), pose.jointCount, pose.promise)});
+  }
+  poses_.remove(handle);
 }
 
 Result<BufferPart> SceneBooks::posePart(PoseHandle handle) const {
@@ -138,6 +143,7 @@ Result<void> SceneBooks::checkWrite(PoseHandle handle, bool writtenByGpu) const 
     return invalid("a pose can be written only between beginFrame and record");
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
+  if (pose->figure != notUsed) return ofFigure(handle, *pose);
   if (pose->writtenByGpu == writtenByGpu) return {};
   return invalid("pose " + std::to_string(handle.index) +
                  (writtenByGpu ? " is written by the CPU; use writePose"
@@ -178,7 +184,9 @@ Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {
 Result<void> Scene::markAllWritten() {
   SceneBooks& books = changed();
   for (std::uint32_t index = 0; index < books.poses_.capacity(); ++index) {
-    if (!books.poses_.isUsed(index) || !books.poses_.at(index).writtenByGpu) continue;
+    if (!books.poses_.isUsed(index)) continue;
+    const ScenePose& pose = books.poses_.at(index);
+    if (!pose.writtenByGpu || pose.figure != notUsed) continue;
     const PoseHandle handle = books.poses_.handleOf(index);
     if (Result<void> marked = markWritten({&handle, 1}); !marked) return marked;
   }

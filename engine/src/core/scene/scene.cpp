@@ -162,7 +162,8 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
   PipelineNeeds needs{.method = description.method,
                       .layout = description.layout,
                       .bounds = description.bounds,
-                      .culledOnGpu = description.culledOnGpu};
+                      .culledOnGpu = description.culledOnGpu,
+                      .figures = !description.pose && books_->figures_.size() != 0};
   if (description.mesh) {
     const SceneMesh* mesh = books_->meshes_.find(description.mesh);
     if (mesh == nullptr) return unknownHandle("mesh", description.mesh);
@@ -172,6 +173,7 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
     const ScenePose* pose = books_->poses_.find(description.pose);
     if (pose == nullptr) return unknownHandle("pose", description.pose);
     needs.promise = pose->promise;
+    needs.figures = pose->figure != notUsed;
   }
   if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   return needs;

@@ -78,7 +78,7 @@ class SlotMap {
   std::uint32_t size_ = 0;
 };
 
-/// `kind` is "mesh", "pose" or "instance".
+/// `kind` is "mesh", "pose", "instance", "clips" or "figure".
 template <typename Thing>
 Error unknownHandle(const char* kind, Handle<Thing> handle) {
   if (!handle) return {ErrorCode::invalidArgument, std::string("the ") + kind + " handle is null"};
@@ -86,6 +86,14 @@ Error unknownHandle(const char* kind, Handle<Thing> handle) {
                                           std::to_string(handle.index) + " of generation " +
                                           std::to_string(handle.generation) +
                                           "; it was removed, or belongs to another system"};
+}
+
+/// `kind` as for `unknownHandle`, `user` is "instance" or "figure".
+inline Error isUsed(const char* kind, std::uint32_t index, std::uint32_t users,
+                    const char* user = "instance") {
+  return {ErrorCode::invalidArgument, std::string(kind) + " " + std::to_string(index) +
+                                          " is used by " + std::to_string(users) + " " + user +
+                                          (users == 1 ? "" : "s")};
 }
 
 }  // namespace dermis

@@ -1,0 +1,189 @@
+// Banks of clips, and figures: poses that the scene samples from clips.
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "scene/books.h"
+#include "scene/slot_map.h"
+
+namespace dermis {
+
+Result<ClipsHandle> Scene::addClips(PackedClips clips) {
+  SceneBooks& books = changed();
+  SceneClips::Content content{std::move(clips), {}, {}};
+  for (std::uint32_t skin = 0; skin < content.bank.skinCount(); ++skin)
+    content.isRigid.push_back(isRigid(content.bank, skin));
+  Range bytes;
+  if (!books.owner_.isCpu) {
+    content.device = deviceClips(content.bank);
+    const std::uint64_t bank = (content.bank.bytes().size() + unitBytes - 1) / unitBytes;
+    const std::uint64_t size = bank * unitBytes + content.device.words.size() * 4;
+    const Result<std::optional<Range>> found =
+        books.take(books.meshStore_, size, packedMeshAlignment);
+    if (!found) return found.error();
+    if (!*found) {
+      return SceneBooks::noRoom("the clips take " + std::to_string(size) + " bytes",
+                                books.meshStore_, "bytes of meshes and clips");
+    }
+    bytes = **found;
+  }
+  const ClipsHandle handle =
+      books.clips_.add({std::make_unique<const SceneClips::Content>(std::move(content)), bytes, 0});
+  if (!books.owner_.isCpu) books.clipUploads_.push_back(handle);
+  return handle;
+}
+
+Result<void> Scene::removeClips(ClipsHandle handle) {
+  SceneBooks& books = changed();
+  const SceneClips* clips = books.clips_.find(handle);
+  if (clips == nullptr) return unknownHandle("clips", handle);
+  if (clips->users != 0) return isUsed("clips", handle.index, clips->users, "figure");
+  if (!books.owner_.isCpu) books.retire(books.meshStore_.ranges, clips->bytes);
+  books.clips_.remove(handle);
+  return {};
+}
+
+Result<FigureHandle> Scene::addFigure(ClipsHandle handle) {
+  SceneBooks& books = changed();
+  SceneClips* const clips = books.clips_.find(handle);
+  if (clips == nullptr) return unknownHandle("clips", handle);
+  const SceneClips::Content& content = *clips->content;
+  const PackedClips& bank = content.bank;
+  const bool onGpu = !books.owner_.isCpu;
+  std::uint64_t joints = 0;
+  for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) joints += bank.jointCount(skin);
+  SceneFigure figure;
+  figure.clips = handle;
+  const Result<std::optional<Range>> matrices = books.takeJoints(joints, onGpu, figure.buffer);
+  if (!matrices) return matrices.error();
+  if (!*matrices) return books.noJoints(bank.skinCount(), joints, onGpu);
+  figure.joints = **matrices;
+  if (onGpu) {
+    const std::uint64_t units = std::uint64_t{content.device.matrixCount} * abi::UNITS_OF_TRANSFORM;
+    Result<std::optional<Range>> taken{std::optional<Range>(Range())};
+    if (units != 0) taken = books.take(books.unitStore_, units, 1);
+    if (!taken || !*taken) {
+      books.retire(books.poseBuffers_[figure.buffer].joints, figure.joints);
+      if (!taken) return taken.error();
+      return SceneBooks::noRoom(
+          "a figure needs " + std::to_string(units) + " units of 16 bytes of palettes",
+          books.unitStore_, "units");
+    }
+    figure.matrices = **taken;
+  }
+  ScenePose pose;
+  pose.writtenByGpu = onGpu;
+  pose.buffer = figure.buffer;
+  pose.joints = {figure.joints.offset, 0};
+  for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
+    pose.jointCount = bank.jointCount(skin);
+    pose.promise = content.isRigid[skin] ? JointPromise::rigid : JointPromise::scaling;
+    pose.joints.size = pose.jointCount;
+    figure.poses.push_back(books.poses_.add(pose));
+    pose.joints.offset += pose.jointCount;
+  }
+  ++clips->users;
+  const FigureHandle added = books.figures_.add(std::move(figure));
+  for (const PoseHandle own : books.figures_.at(added.index).poses)
+    books.poses_.at(own.index).figure = added.index;
+  return added;
+}
+
+Result<void> Scene::removeFigure(FigureHandle handle) {
+  SceneBooks& books = changed();
+  const SceneFigure* figure = books.figures_.find(handle);
+  if (figure == nullptr) return unknownHandle("figure", handle);
+  for (const PoseHandle pose : figure->poses) {
+    const std::uint32_t users = books.poses_.at(pose.index).users;
+    if (users != 0) return isUsed("pose", pose.index, users);
+  }
+  for (const PoseHandle pose : figure->poses) books.dropPose(pose);
+  books.retire(books.poseBuffers_[figure->buffer].joints, figure->joints);
+  if (figure->matrices.size != 0) books.retire(books.unitStore_.ranges, figure->matrices);
+  --books.clips_.at(figure->clips.index).users;
+  books.figures_.remove(handle);
+  return {};
+}
+
+Result<PoseHandle> Scene::pose(FigureHandle handle, std::uint32_t skin) const {
+  const SceneFigure* figure = books_->figures_.find(handle);
+  if (figure == nullptr) return unknownHandle("figure", handle);
+  if (skin < figure->poses.size()) return PoseHandle(figure->poses[skin]);
+  return Error{ErrorCode::invalidArgument,
+               "figure " + std::to_string(handle.index) + " has no skin " + std::to_string(skin) +
+                   "; its clips have " + std::to_string(figure->poses.size())};
+}
+
+Result<void> Scene::play(std::span<const FigurePlay> plays) {
+  SceneBooks& books = changed();
+  std::vector<PackedLayers>& packed = books.layersScratch_;
+  packed.clear();
+  for (const FigurePlay& play : plays) {
+    const auto refused = [&](const Error& error) {
+      return Error{error.code,
+                   "entry " + std::to_string(&play - plays.data()) + ": " + error.message};
+    };
+    const SceneFigure* figure = books.figures_.find(play.figure);
+    if (figure == nullptr) return refused(unknownHandle("figure", play.figure));
+    const Result<PackedLayers> layers =
+        packLayers(books.clips_.at(figure->clips.index).content->bank, play.layers, "");
+    if (!layers) return refused(layers.error());
+    packed.push_back(*layers);
+  }
+  for (std::size_t entry = 0; entry < plays.size(); ++entry) {
+    SceneFigure& figure = books.figures_.at(plays[entry].figure.index);
+    figure.layers = packed[entry];
+    ++figure.version;
+    for (const PoseHandle pose : figure.poses) ++books.poses_.at(pose.index).version;
+    if (figure.listedIn == books.planNumber_ + 1) continue;
+    figure.listedIn = books.planNumber_ + 1;
+    books.posed_.insert(books.posed_.end(), figure.poses.begin(), figure.poses.end());
+  }
+  return {};
+}
+
+std::span<JointMatrix> SceneBooks::matricesOf(const SceneFigure& figure) {
+  const std::span<JointMatrix> first = matricesOf(poses_.at(figure.poses[0].index));
+  return {first.data(), static_cast<std::size_t>(figure.joints.size)};
+}
+
+/// For an instance that is skinned with one of its poses.
+void SceneBooks::sampleFigure(std::uint32_t index) {
+  SceneFigure& figure = figures_.at(index);
+  if (figure.sampled == figure.version || figure.plannedIn == planNumber_) return;
+  figure.plannedIn = planNumber_;
+  figure.place = static_cast<std::uint32_t>(sampling_.size());
+  sampling_.push_back(index);
+}
+
+/// For kernels.
+void SceneBooks::gatherFigures() {
+  if (owner_.isCpu) return;
+  for (const std::uint32_t index : sampling_) {
+    const SceneFigure& figure = figures_.at(index);
+    const SceneClips& clips = clips_.at(figure.clips.index);
+    const auto& layers = figure.layers.layers;
+    const abi::FigureRecord record{
+        .matrices = static_cast<std::uint32_t>(figure.matrices.offset),
+        .poses = static_cast<std::uint32_t>(figure.joints.offset) * abi::UNITS_OF_MATRIX,
+        .layerCount = figure.layers.count,
+        .reserved = 0,
+        .time0 = layers[0].time,
+        .layer0 = layers[0].bits,
+        .time1 = layers[1].time,
+        .layer1 = layers[1].bits,
+        .time2 = layers[2].time,
+        .layer2 = layers[2].bits,
+        .time3 = layers[3].time,
+        .layer3 = layers[3].bits};
+    work_.addFigure({&clips.content->device,
+                     static_cast<std::uint32_t>(clips.bytes.offset / 4),
+                     static_cast<std::uint32_t>(clips.deviceOffset() / 4),
+                     figure.buffer,
+                     {}},
+                    record);
+  }
+}
+
+}  // namespace dermis

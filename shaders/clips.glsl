@@ -1,0 +1,144 @@
+// Reads a bank of clips (engine/src/core/clips/bank.h) in the mesh buffer. It was checked when it was made.
+#ifndef DERMIS_CLIPS_GLSL
+#define DERMIS_CLIPS_GLSL
+
+#include "abi.h"
+#include "quaternion.glsl"
+
+layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Clips { uint clipWords[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer ClipUnits { uvec4 clipUnits[]; };
+
+// What is animated, by number.
+const uint PATH_TRANSLATION = 0u;
+const uint PATH_ROTATION = 1u;
+const uint PATH_SCALE = 2u;
+
+// Rows of a 3×4 matrix.
+struct Transform {
+  vec4 r0;
+  vec4 r1;
+  vec4 r2;
+};
+
+Transform loadTransform(uint word) {
+  uint unit = word / 4u;
+  return Transform(uintBitsToFloat(clipUnits[unit]), uintBitsToFloat(clipUnits[unit + 1u]), uintBitsToFloat(clipUnits[unit + 2u]));
+}
+
+vec4 rowTimes(vec4 row, Transform b) {
+  precise vec4 product = fma(vec4(row.z), b.r2, fma(vec4(row.y), b.r1, row.x * b.r0));
+  precise float shifted = product.w + row.w;
+  return vec4(product.xyz, shifted);
+}
+
+Transform multiply(Transform a, Transform b) {
+  return Transform(rowTimes(a.r0, b), rowTimes(a.r1, b), rowTimes(a.r2, b));
+}
+
+// A number of float16. `unpackHalf2x16` may take a denormal one for 0.
+float fromHalf(uint bits) {
+  precise float denormal = float(bits & 0x3ffu) * 5.9604644775390625e-8;  // 2⁻²⁴
+  uint exponent = bits >> 10u & 31u;
+  float size = exponent == 0u ? denormal : uintBitsToFloat((exponent + 112u) << 23u | (bits & 0x3ffu) << 13u);
+  return (bits & 0x8000u) != 0u ? -size : size;
+}
+
+// A key: three integers, and for rotations the component that is not stored.
+struct Key {
+  uvec3 values;
+  uint missing;
+};
+
+// `half` counts 16 bits from the beginning of the mesh buffer. A key of size 0, 1 or 2 has 2, 3 or 4 of them.
+Key loadKey(uint firstHalf, uint size, bool isRotation) {
+  uint word = firstHalf / 2u;
+  uint low = clipWords[word];
+  uint high = clipWords[word + min(size, 1u)];
+  if (size == 0u) return Key((uvec3(low) >> uvec3(0u, 10u, 20u)) & 1023u, low >> 30u);
+  if (size == 1u) {
+    bool isOdd = firstHalf % 2u == 1u;
+    uint both = isOdd ? low >> 16u | high << 16u : low;
+    uint last = isOdd ? high >> 16u : high & 0xffffu;
+    if (isRotation) return Key(uvec3(both, both >> 16u, last) & 0x7fffu, (both >> 15u & 1u) | both >> 31u << 1u);
+    return Key(uvec3(both & 0xffffu, both >> 16u, last), 0u);
+  }
+  if (isRotation) return Key(uvec3(low & 0xfffffu, (low >> 20u & 1023u) | (high & 1023u) << 10u, high >> 10u & 0xfffffu), low >> 30u);
+  return Key(uvec3(low & 0x1fffffu, low >> 21u | (high & 1023u) << 11u, high >> 10u & 0x1fffffu), 0u);
+}
+
+// A quaternion of about unit length.
+vec4 rotationOf(Key key, uint size) {
+  const float rootOfHalf = 0.70710678;
+  uint largest = (1u << (10u + 5u * size)) - 1u;
+  precise float scale = quotient(2.0 * rootOfHalf, float(largest));
+  precise vec3 v = vec3(key.values) * scale - rootOfHalf;
+  precise float square = 1.0 - dot3(v, v);
+  float other = squareRoot(max(0.0, square));
+  if (key.missing == 0u) return vec4(other, v);
+  if (key.missing == 1u) return vec4(v.x, other, v.yz);
+  if (key.missing == 2u) return vec4(v.xy, other, v.z);
+  return vec4(v, other);
+}
+
+vec4 unitOrIdentity(vec4 q) {
+  float square = dot4(q, q);
+  precise vec4 unit = q * inverseRoot(square);
+  return square > 0.0 ? unit : vec4(0.0, 0.0, 0.0, 1.0);
+}
+
+// A clip at a time inside it.
+struct ClipTime {
+  uint clips;    // the word where the bank begins
+  uint classes;  // word offset in the bank
+  float frame;   // of the finest intervals
+};
+
+vec4 sampleKeys(ClipTime at, uint keyClass, uint column, bool isRotation) {
+  uint unit = (at.clips + at.classes + keyClass * CLIP_CLASS_WORDS) / 4u;
+  uvec4 a = clipUnits[unit];        // format, level, number of keys, number of columns
+  uvec4 b = clipUnits[unit + 1u];   // keys, halves of a row, ranges, jumps
+  uint size = a.x & 3u;
+  // A power of two, which a division need not give exactly.
+  precise float position = at.frame * uintBitsToFloat((127u - a.y) << 23u);
+  float interval = min(floor(position), float(a.z - 2u));
+  precise float fraction = position - interval;
+  uint row = uint(interval);
+  if (b.w != 0u) {
+    uint word = at.clips + b.w + row * ((a.w + 3u) / 4u) + column / 4u;
+    uint jump = clipWords[word] >> (column % 4u * 8u) & 255u;
+    precise float part = fraction * 256.0;
+    if (jump != 0u) fraction = part >= float(jump + 1u) ? 1.0 : 0.0;
+  }
+  uint firstHalf = 2u * (at.clips + b.x) + row * b.y + column * (2u + size);
+  Key from = loadKey(firstHalf, size, isRotation);
+  Key to = loadKey(firstHalf + b.y, size, isRotation);
+  precise float rest = 1.0 - fraction;
+  if (isRotation) {
+    vec4 p = rotationOf(from, size);
+    vec4 q = rotationOf(to, size);
+    float share = dot4(p, q) < 0.0 ? -fraction : fraction;
+    precise vec4 mixed = rest * p + share * q;
+    return unitOrIdentity(mixed);
+  }
+  uint range = at.clips + b.z + 6u * column;
+  vec3 least = uintBitsToFloat(uvec3(clipWords[range], clipWords[range + 1u], clipWords[range + 2u]));
+  vec3 scale = uintBitsToFloat(uvec3(clipWords[range + 3u], clipWords[range + 4u], clipWords[range + 5u]));
+  precise vec3 p = least + vec3(from.values) * scale;
+  precise vec3 q = least + vec3(to.values) * scale;
+  precise vec3 mixed = rest * p + fraction * q;
+  return vec4(mixed, 0.0);
+}
+
+// `word` is that of the track, `still` the value of a track without numbers.
+vec4 sampleTrack(ClipTime at, uint word, bool isRotation, vec4 still) {
+  uint kind = word >> 30u;
+  if (kind == 0u) return still;
+  if (kind == 1u) {
+    uint value = at.clips + (word & 0x3fffffffu);
+    return uintBitsToFloat(uvec4(clipWords[value], clipWords[value + 1u], clipWords[value + 2u],
+                                 isRotation ? clipWords[value + 3u] : 0u));
+  }
+  return sampleKeys(at, word >> TRACK_COLUMN_BITS & 255u, word & ((1u << TRACK_COLUMN_BITS) - 1u), isRotation);
+}
+
+#endif

@@ -1,0 +1,61 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+// Makes the poses of figures from the local transforms of their nodes: global transforms × inverse bind matrices. A dispatch finds
+// the joints of one band, nodes at most 8 deep below those whose global transforms an earlier dispatch has stored, and stores those
+// that the next one needs. A workgroup for each figure, an invocation for each of its steps.
+
+#include "abi.h"
+#include "clips.glsl"
+#include "tables.glsl"
+
+layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
+
+layout(push_constant) uniform Push { ComposePush push; };
+
+// Those that this dispatch stores are not read by it.
+layout(set = 0, binding = BINDING_PALETTES, std430) buffer Transforms { uvec4 transforms[]; };
+layout(set = 0, binding = BINDING_POSITIONS, std430) restrict writeonly buffer Joints { uvec4 joints[]; };
+
+Transform transformOf(uint figure, uint matrix) {
+  uint unit = figure + matrix * UNITS_OF_TRANSFORM;
+  return Transform(uintBitsToFloat(transforms[unit]), uintBitsToFloat(transforms[unit + 1u]),
+                   uintBitsToFloat(transforms[unit + 2u]));
+}
+
+void main() {
+  uint number = workgroupNumber();
+  if (number >= push.workgroupCount) return;
+  uvec4 figure = tableUnit(push.figures + number * FIGURE_WORDS);  // the first words of a FigureRecord
+  for (uint index = gl_LocalInvocationID.x; index < push.stepCount; index += gl_WorkGroupSize.x) {
+    uvec4 unit = clipUnits[push.steps / 4u + index];
+    StepRecord step = StepRecord(unit.x, unit.y, unit.z, unit.w);
+    bool isJoint = step.matrix != 0u;
+    uint matrix = step.node;
+    Transform product;
+    if (isJoint) {
+      product = loadTransform(push.clips + step.matrix);
+    } else {
+      product = transformOf(figure.x, matrix);
+      matrix = clipWords[push.above + matrix];
+    }
+    while (matrix != CLIP_ROOT) {
+      product = multiply(transformOf(figure.x, matrix & ~CLIP_GLOBAL), product);
+      if ((matrix & CLIP_GLOBAL) != 0u) break;
+      matrix = clipWords[push.above + matrix];
+    }
+    uvec4 r0 = floatBitsToUint(product.r0);
+    uvec4 r1 = floatBitsToUint(product.r1);
+    uvec4 r2 = floatBitsToUint(product.r2);
+    uint place = (isJoint ? figure.y : figure.x) + step.place * UNITS_OF_TRANSFORM;
+    if (isJoint) {
+      joints[place] = r0;
+      joints[place + 1u] = r1;
+      joints[place + 2u] = r2;
+    } else {
+      transforms[place] = r0;
+      transforms[place + 1u] = r1;
+      transforms[place + 2u] = r2;
+    }
+  }
+}
