@@ -1,7 +1,7 @@
 // The C interface of Dermis: the library `dermis` has core, the CPU path, the Vulkan back end and,
 // if it was built with it, glTF import. C99. What a function, a method or a format means is
-// described in more detail in the C++ header that has it: mesh.h, layout.h, plan.h, scene.h, cpu.h,
-// gltf.h, vulkan/context.h, vulkan/scene_recorder.h.
+// described in more detail in the C++ header that has it: mesh.h, layout.h, clips.h, plan.h,
+// scene.h, cpu.h, gltf.h, vulkan/context.h, vulkan/scene_recorder.h.
 //
 // Rules, once:
 //
@@ -16,9 +16,10 @@
 // - Nothing is kept of a pointer after the function returns, unless it says so. Lists that a
 //   function returns belong to the object; the function says how long they are valid.
 // - `dermis_destroy` destroys every object that a function creates. Using a destroyed object is
-//   undefined. Using the handle of a removed mesh, pose or instance is an error.
-// - One thread at a time may use an object. A context, a mesh and a model may be used by any number
-//   of threads. So may a plan, unless `dermis_make_plan` fills it.
+//   undefined. Using the handle of something that was removed is an error.
+// - One thread at a time may use an object. A context, a mesh, a bank and a model may be used by
+// any
+//   number of threads. So may a plan, unless `dermis_make_plan` fills it.
 // - Callbacks get their `user` pointer first, and must not throw or longjmp. If one that creates
 //   something fails, the function that needs it fails with its code and error; a code that is not
 //   from `DERMIS_INVALID_ARGUMENT` to `DERMIS_IO_ERROR` counts as `DERMIS_VULKAN_ERROR`.
@@ -106,6 +107,14 @@ typedef struct dermis_pose {
 typedef struct dermis_instance {
   uint32_t kind, index, generation;
 } dermis_instance;
+// Clips that a scene has.
+typedef struct dermis_clips {
+  uint32_t kind, index, generation;
+} dermis_clips;
+// What plays clips.
+typedef struct dermis_figure {
+  uint32_t kind, index, generation;
+} dermis_figure;
 
 // A joint matrix: joint global transform × inverse bind matrix. An affine transform as a row-major
 // 3×4 matrix, m[row][column]; column 3 is the translation. Skinned vertices are in the space of the
@@ -558,6 +567,7 @@ typedef struct dermis_scene_info {
   uint64_t completed_frame;
   uint32_t culled_candidates, gpu_visible, gpu_skinned, gpu_settled;
   dermis_store meshes, palettes, outputs;
+  uint64_t sampled_figures;  // whose poses were sampled from clips
 } dermis_scene_info;
 // Says what the last frame did, and how much memory the scene has.
 DERMIS_C_API dermis_code dermis_scene_contents(dermis_scene* scene, dermis_scene_info* info,
@@ -853,7 +863,8 @@ DERMIS_C_API dermis_code dermis_commands_commit(dermis_commands* commands, uint3
 DERMIS_C_API dermis_code dermis_commands_read_back(dermis_commands* commands, uint64_t frame,
                                                    const void* bytes, size_t byte_count,
                                                    dermis_error* error);
-// Where a GPU pass of the engine writes the joint matrices of a pose.
+// Where the joint matrices of a pose are that a GPU pass of the engine writes, or that belongs to a
+// figure.
 DERMIS_C_API dermis_code dermis_commands_pose_part(const dermis_commands* commands,
                                                    dermis_pose pose, dermis_part* part,
                                                    dermis_error* error);
@@ -948,6 +959,159 @@ DERMIS_C_API dermis_code dermis_model_pose(const dermis_model* model, uint32_t p
                                            uint32_t clip, double time, dermis_joint* joints,
                                            uint32_t joint_count, float* morph_weights,
                                            uint32_t morph_weight_count, dermis_error* error);
+
+// ---- Clips (clips.h): animations packed into a bank, from which poses are sampled, by the scene
+// or by `dermis_sample_pose`.
+
+// How values between two keys are computed, as in glTF 2.0.
+typedef enum dermis_interpolation {
+  DERMIS_INTERPOLATION_STEP = 0,
+  DERMIS_INTERPOLATION_LINEAR = 1,
+  DERMIS_INTERPOLATION_CUBIC_SPLINE = 2,
+  DERMIS_INTERPOLATION_INT32 = 0x7fffffff  // not a value
+} dermis_interpolation;
+// What a channel animates.
+typedef enum dermis_channel_path {
+  DERMIS_CHANNEL_TRANSLATION = 0,
+  DERMIS_CHANNEL_ROTATION = 1,
+  DERMIS_CHANNEL_SCALE = 2,
+  DERMIS_CHANNEL_WEIGHTS = 3,             // is not packed
+  DERMIS_CHANNEL_PATH_INT32 = 0x7fffffff  // not a value
+} dermis_channel_path;
+
+// A node of a skeleton, at rest, relative to its parent.
+typedef struct dermis_node {
+  uint32_t size;
+  uint32_t parent;   // 1 + its index; 0: none
+  const char* name;  // for messages only
+  double translation[3];
+  double rotation[4];  // a quaternion: x, y, z, w; 0 0 0 0 counts as 0 0 0 1
+  double scale[3];     // 0 0 0 counts as 1 1 1
+  const double*
+      matrix;  // or null. 3 rows of 4, in place of the three above; no clip may animate it
+} dermis_node;
+// The joints of a skin, as a pose has them.
+typedef struct dermis_skin {
+  uint32_t size;
+  uint32_t joint_count;
+  const char* name;                  // for messages only
+  const uint32_t* joints;            // indices of nodes
+  const dermis_joint* inverse_bind;  // one for each joint
+} dermis_skin;
+// One animated property of one node.
+typedef struct dermis_channel {
+  uint32_t size;
+  uint32_t node;
+  dermis_channel_path path;
+  dermis_interpolation interpolation;
+  const float* times;  // seconds, not descending. If two are equal, the value jumps there
+  // 3 for each key, or 4 for rotations; three times as many for splines: in-tangent, value,
+  // out-tangent.
+  const float* values;
+  uint32_t key_count;    // at least 1
+  uint32_t value_count;  // numbers
+} dermis_channel;
+// A clip.
+typedef struct dermis_clip_view {
+  uint32_t size;
+  uint32_t channel_count;
+  const char* name;  // for messages only
+  double duration;   // seconds
+  const dermis_channel* channels;
+  uint32_t is_clamped;   // 0: its time wraps
+  uint32_t is_additive;  // whether it is added to others, as its difference from
+  uint32_t base_clip;    // this clip, 1 + its index, or 0: the rest pose
+  double base_time;      // at this time
+} dermis_clip_view;
+// What a bank is made of.
+typedef struct dermis_clips_source {
+  uint32_t size;
+  uint32_t node_count, skin_count, clip_count, mask_count;
+  const dermis_node* nodes;
+  const dermis_skin* skins;
+  const dermis_clip_view* clips;
+  const float* masks;  // for each mask a factor from 0 to 1 for each node
+  // How far anything that a joint moves may be from where the clips have it; 0: 1/10,000 of the
+  // extent of the skeleton.
+  double max_error;
+  const dermis_mesh_view* meshes;  // of each skin: how far it reaches; null: as far as its joints
+} dermis_clips_source;
+// Lists the skeleton and the clips of a model, as a source that the caller may change. It is valid
+// as long as the model.
+DERMIS_C_API dermis_code dermis_model_clips(const dermis_model* model, dermis_clips_source* source,
+                                            dermis_error* error);
+
+// A bank of clips. It can be stored with the assets. Any number of threads may use it.
+typedef struct dermis_bank dermis_bank;
+// Packs clips, at import.
+DERMIS_C_API dermis_code dermis_pack_clips(const dermis_clips_source* source, dermis_bank** bank,
+                                           dermis_error* error);
+// Makes a bank from stored bytes, which it copies and checks.
+DERMIS_C_API dermis_code dermis_bank_load(const void* bytes, size_t byte_count, dermis_bank** bank,
+                                          dermis_error* error);
+
+// What is known of a packed clip.
+typedef struct dermis_clip_info {
+  float duration;  // seconds
+  uint32_t is_clamped, is_additive;
+} dermis_clip_info;
+// What is known of a bank. Pointers are valid as long as it.
+typedef struct dermis_bank_info {
+  uint32_t size;
+  uint32_t node_count;  // that clips move
+  const void* bytes;    // the blob
+  uint64_t byte_count;  // of the blob
+  uint32_t skin_count, clip_count, mask_count;
+  const uint32_t* joint_counts;   // of each skin
+  const dermis_clip_info* clips;  // of each clip
+  double worst_error;             // of the poses; 0 if the bank was loaded from bytes
+  const char* worst;              // where: clip, node and time
+} dermis_bank_info;
+// Says what is known of a bank.
+DERMIS_C_API dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info,
+                                              dermis_error* error);
+
+// What takes part in a pose. Weights are relative; layers of additive clips are added.
+typedef struct dermis_clip_layer {
+  double time;    // seconds; wrapped or clamped as the clip says
+  float weight;   // required: 0 does nothing
+  uint32_t clip;  // its number in the bank
+  uint32_t mask;  // 1 + its number in the source; 0: none
+  uint32_t hold;  // whether the time is clamped, although the clip wraps
+} dermis_clip_layer;
+// Samples the pose of a skin of at most 4 layers. Without layers it rests. The same bits on every
+// processor.
+DERMIS_C_API dermis_code dermis_sample_pose(const dermis_bank* bank,
+                                            const dermis_clip_layer* layers, uint32_t layer_count,
+                                            uint32_t skin, dermis_joint* joints,
+                                            uint32_t joint_count, dermis_error* error);
+
+// Adds a bank to a scene, which keeps its bytes: it may then be destroyed.
+DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank,
+                                          dermis_clips* clips, dermis_error* error);
+// Fails if a figure uses it.
+DERMIS_C_API dermis_code dermis_remove_clips(dermis_scene* scene, dermis_clips clips,
+                                             dermis_error* error);
+// Adds figures, which rest until they play. If it fails, it adds none.
+DERMIS_C_API dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips, uint32_t count,
+                                            dermis_figure* figures, dermis_error* error);
+// Removes a figure and its poses. Fails if an instance uses one of them.
+DERMIS_C_API dermis_code dermis_remove_figure(dermis_scene* scene, dermis_figure figure,
+                                              dermis_error* error);
+// Gets the pose of a figure for a skin of its bank, which the scene samples.
+DERMIS_C_API dermis_code dermis_figure_pose(const dermis_scene* scene, dermis_figure figure,
+                                            uint32_t skin, dermis_pose* pose, dermis_error* error);
+
+// What a figure plays from now on. Layers are copied.
+typedef struct dermis_play {
+  dermis_figure figure;
+  uint32_t layer_count;  // at most 4; 0: it rests
+  const dermis_clip_layer* layers;
+} dermis_play;
+// Sets what figures play, at any time. If it fails, nothing changes, and the message begins with
+// "entry " and the index of the first that is wrong.
+DERMIS_C_API dermis_code dermis_play_clips(dermis_scene* scene, const dermis_play* plays,
+                                           uint32_t count, dermis_error* error);
 
 // ---- Vulkan. Define DERMIS_VULKAN, or include vulkan_core.h before. No loader is linked.
 

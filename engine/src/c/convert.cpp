@@ -118,9 +118,10 @@ std::span<const JointMatrix> jointsOf(const dermis_joint* joints, std::uint32_t 
 
 void checkKind(std::uint32_t kind, Kind wanted, const char* name) {
   if (kind == static_cast<std::uint32_t>(wanted)) return;
-  constexpr const char* kinds[] = {"nothing", "a mesh", "a pose", "an instance"};
+  constexpr const char* kinds[] = {"nothing",     "a mesh", "a pose",
+                                   "an instance", "clips",  "a figure"};
   fail(std::string(name) + ": this is the handle of " +
-       (kind < 4 ? kinds[kind] : "nothing that Dermis made"));
+       (kind < std::size(kinds) ? kinds[kind] : "nothing that Dermis made"));
 }
 
 View::View(const dermis_mesh_view* callers) {

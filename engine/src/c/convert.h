@@ -30,7 +30,7 @@ std::span<const JointMatrix> jointsOf(const dermis_joint* joints, std::uint32_t 
                                       const char* name);
 
 /// The kinds of handles.
-enum class Kind : std::uint32_t { mesh = 1, pose = 2, instance = 3 };
+enum class Kind : std::uint32_t { mesh = 1, pose = 2, instance = 3, clips = 4, figure = 5 };
 constexpr Kind kindOf(const dermis_mesh&) {
   return Kind::mesh;
 }
@@ -39,6 +39,12 @@ constexpr Kind kindOf(const dermis_pose&) {
 }
 constexpr Kind kindOf(const dermis_instance&) {
   return Kind::instance;
+}
+constexpr Kind kindOf(const dermis_clips&) {
+  return Kind::clips;
+}
+constexpr Kind kindOf(const dermis_figure&) {
+  return Kind::figure;
 }
 void checkKind(std::uint32_t kind, Kind wanted, const char* name);
 
@@ -57,6 +63,12 @@ inline PoseHandle handleOf(const dermis_pose& pose) {
 }
 inline InstanceHandle handleOf(const dermis_instance& instance) {
   return handleOf<InstanceHandle>(instance, "instance");
+}
+inline ClipsHandle handleOf(const dermis_clips& clips) {
+  return handleOf<ClipsHandle>(clips, "clips");
+}
+inline FigureHandle handleOf(const dermis_figure& figure) {
+  return handleOf<FigureHandle>(figure, "figure");
 }
 template <typename CHandle, typename CppHandle>
 CHandle handleTo(const CppHandle& handle) {

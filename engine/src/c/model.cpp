@@ -3,6 +3,7 @@
 #include <deque>
 #include <memory>
 
+#include "clips.h"
 #include "convert.h"
 #include "dermis/gltf.h"
 
@@ -24,6 +25,8 @@ struct dermis_model : Object {
   }
 
   gltf::Model model;
+  const Skeleton skeleton{gltf::skeleton(model)};
+  const ClipsForCaller animations{skeleton, gltf::clips(model)};
   std::deque<ViewForCaller> views;  ///< of the skinned primitives
   std::vector<dermis_clip> clips;
   std::vector<const char*> notes;
@@ -108,6 +111,15 @@ dermis_code dermis_model_primitive(const dermis_model* model, uint32_t index,
                                         : gltf::Material{};
     std::copy_n(material.baseColor.begin(), 4, result.base_color);
     give(primitive, result);
+  });
+}
+
+dermis_code dermis_model_clips(const dermis_model* model, dermis_clips_source* clips,
+                               dermis_error* error) {
+  return guarded(error, [&] {
+    const dermis_model& source = required(model, "model");
+    checkOut(clips, "source");
+    give(clips, source.animations.source);
   });
 }
 

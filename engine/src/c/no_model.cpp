@@ -22,6 +22,9 @@ dermis_code dermis_model_primitive(const dermis_model*, uint32_t, dermis_primiti
                                    dermis_error* error) {
   return missing(error);
 }
+dermis_code dermis_model_clips(const dermis_model*, dermis_clips_source*, dermis_error* error) {
+  return missing(error);
+}
 dermis_code dermis_model_pose(const dermis_model*, uint32_t, uint32_t, double, dermis_joint*,
                               uint32_t, float*, uint32_t, dermis_error* error) {
   return missing(error);

@@ -206,6 +206,7 @@ dermis_code dermis_scene_contents(dermis_scene* scene, dermis_scene_info* info,
     result.skinned_count = static_cast<std::uint32_t>(scene->skinned.size());
     result.settled_count = static_cast<std::uint32_t>(scene->settled.size());
     result.converted_poses = frame.convertedPoses;
+    result.sampled_figures = frame.sampledFigures;
     result.visibility_count = source.visibilityCount();
     result.skinned_vertices = frame.skinnedVertices;
     result.written_bytes = frame.writtenBytes;

@@ -1,0 +1,285 @@
+// Banks of clips, and figures.
+#include "clips.h"
+
+#include <algorithm>
+#include <deque>
+
+#include "convert.h"
+
+using namespace dermis;
+using namespace dermis::c;
+
+struct dermis_bank : Object {
+  explicit dermis_bank(PackedClips packed, PackClipsReport of = {})
+      : clips(std::move(packed)), report(std::move(of)) {
+    for (std::uint32_t skin = 0; skin < clips.skinCount(); ++skin)
+      jointCounts.push_back(clips.jointCount(skin));
+    for (std::uint32_t i = 0; i < clips.clipCount(); ++i) {
+      const ClipInfo info = clips.clip(i);
+      infos.push_back({info.duration, info.wraps ? 0u : 1u, info.additive ? 1u : 0u});
+    }
+  }
+
+  PackedClips clips;
+  PackClipsReport report;
+  std::vector<std::uint32_t> jointCounts;
+  std::vector<dermis_clip_info> infos;
+};
+
+namespace {
+
+bool isZero(std::span<const double> numbers) {
+  return std::ranges::all_of(numbers, [](double number) { return number == 0; });
+}
+
+SkeletonNode nodeOf(const dermis_node& node) {
+  SkeletonNode result;
+  result.name = text(node.name);
+  if (node.parent != 0) result.parent = node.parent - 1;
+  std::copy_n(node.translation, 3, result.translation.begin());
+  if (!isZero(node.rotation)) std::copy_n(node.rotation, 4, result.rotation.begin());
+  if (!isZero(node.scale)) std::copy_n(node.scale, 3, result.scale.begin());
+  if (node.matrix == nullptr) return result;
+  Transform& matrix = result.matrix.emplace();
+  for (std::size_t i = 0; i < 12; ++i) matrix[i / 4][i % 4] = node.matrix[i];
+  return result;
+}
+
+ChannelView channelOf(const dermis_channel& channel) {
+  ChannelView result;
+  result.node = channel.node;
+  result.path = static_cast<ChannelPath>(
+      enumerator(channel.path, DERMIS_CHANNEL_WEIGHTS, "a channel's path"));
+  result.interpolation = static_cast<Interpolation>(enumerator(
+      channel.interpolation, DERMIS_INTERPOLATION_CUBIC_SPLINE, "a channel's interpolation"));
+  result.times = array(channel.times, channel.key_count, "a channel's times");
+  result.values = array(channel.values, channel.value_count, "a channel's values");
+  return result;
+}
+
+ClipView clipOf(const dermis_clip_view& clip) {
+  ClipView result;
+  result.name = text(clip.name);
+  result.duration = clip.duration;
+  for (const dermis_channel& channel : inArray(clip.channels, clip.channel_count, "channels"))
+    result.channels.push_back(channelOf(channel));
+  result.wraps = clip.is_clamped == 0;
+  result.additive = clip.is_additive != 0;
+  if (clip.base_clip != 0) result.baseClip = clip.base_clip - 1;
+  result.baseTime = clip.base_time;
+  return result;
+}
+
+/// Views of what the caller has.
+struct Source {
+  explicit Source(const dermis_clips_source* callers) {
+    const dermis_clips_source source = in(callers, "source");
+    for (const dermis_node& node : inArray(source.nodes, source.node_count, "nodes"))
+      skeleton.nodes.push_back(nodeOf(node));
+    for (const dermis_skin& skin : inArray(source.skins, source.skin_count, "skins")) {
+      skeleton.skins.push_back(
+          {text(skin.name), array(skin.joints, skin.joint_count, "a skin's joints"),
+           jointsOf(skin.inverse_bind, skin.joint_count, "a skin's inverse_bind")});
+    }
+    for (const dermis_clip_view& clip : inArray(source.clips, source.clip_count, "clips"))
+      clips.push_back(clipOf(clip));
+    const std::size_t nodes = source.node_count;
+    const std::span<const float> all = array(source.masks, source.mask_count * nodes, "masks");
+    for (std::size_t mask = 0; mask < source.mask_count; ++mask)
+      masks.push_back(all.subspan(mask * nodes, nodes));
+    options.masks = masks;
+    options.maxError = source.max_error;
+    if (source.meshes == nullptr) return;
+    const std::size_t stride = source.meshes->size;
+    for (std::uint32_t skin = 0; skin < source.skin_count; ++skin) {
+      const View view(reinterpret_cast<const dermis_mesh_view*>(
+          reinterpret_cast<const std::byte*>(source.meshes) + skin * stride));
+      bounds.push_back(must(
+          jointBounds(view.mesh, static_cast<std::uint32_t>(skeleton.skins[skin].joints.size()))));
+    }
+    for (const JointBounds& of : bounds) meshes.push_back(&of);
+    options.meshes = meshes;
+  }
+  Source(const Source&) = delete;
+  Source& operator=(const Source&) = delete;
+
+  Skeleton skeleton;
+  std::vector<ClipView> clips;
+  std::vector<std::span<const float>> masks;
+  std::deque<JointBounds> bounds;
+  std::vector<const JointBounds*> meshes;
+  PackClipsOptions options;
+};
+
+void appendLayers(std::span<const dermis_clip_layer> layers, std::vector<ClipLayer>& to) {
+  for (const dermis_clip_layer& layer : layers)
+    to.push_back({layer.clip, layer.time, layer.weight, layer.mask, layer.hold != 0});
+}
+
+}  // namespace
+
+namespace dermis::c {
+
+ClipsForCaller::ClipsForCaller(const Skeleton& skeleton, std::span<const ClipView> views) {
+  for (const SkeletonNode& node : skeleton.nodes) {
+    dermis_node& result = nodes_.emplace_back();
+    result.size = sizeof(result);
+    if (node.parent < skeleton.nodes.size()) result.parent = node.parent + 1;
+    result.name = names_.emplace_back(node.name).c_str();
+    std::ranges::copy(node.translation, result.translation);
+    std::ranges::copy(node.rotation, result.rotation);
+    std::ranges::copy(node.scale, result.scale);
+    if (!node.matrix) continue;
+    result.matrix = matrices_.emplace_back(*node.matrix)[0].data();
+  }
+  for (const SkeletonSkin& skin : skeleton.skins) {
+    skins_.push_back({sizeof(dermis_skin), static_cast<std::uint32_t>(skin.joints.size()),
+                      names_.emplace_back(skin.name).c_str(), skin.joints.data(),
+                      reinterpret_cast<const dermis_joint*>(skin.inverseBind.data())});
+  }
+  for (const ClipView& clip : views) {
+    std::vector<dermis_channel>& channels = channels_.emplace_back();
+    for (const ChannelView& channel : clip.channels) {
+      channels.push_back(
+          {sizeof(dermis_channel), channel.node, static_cast<dermis_channel_path>(channel.path),
+           static_cast<dermis_interpolation>(channel.interpolation), channel.times.data(),
+           channel.values.data(), static_cast<std::uint32_t>(channel.times.size()),
+           static_cast<std::uint32_t>(channel.values.size())});
+    }
+    dermis_clip_view& result = clips_.emplace_back();
+    result.size = sizeof(result);
+    result.channel_count = static_cast<std::uint32_t>(channels.size());
+    result.name = names_.emplace_back(clip.name).c_str();
+    result.duration = clip.duration;
+    result.channels = channels.data();
+  }
+  source.size = sizeof(source);
+  source.node_count = static_cast<std::uint32_t>(nodes_.size());
+  source.skin_count = static_cast<std::uint32_t>(skins_.size());
+  source.clip_count = static_cast<std::uint32_t>(clips_.size());
+  source.nodes = nodes_.data();
+  source.skins = skins_.data();
+  source.clips = clips_.data();
+}
+
+}  // namespace dermis::c
+
+extern "C" {
+
+dermis_code dermis_pack_clips(const dermis_clips_source* callers, dermis_bank** bank,
+                              dermis_error* error) {
+  return guarded(error, [&] {
+    const Source source(callers);
+    dermis_bank*& result = required(bank, "bank");
+    PackClipsReport report;
+    PackedClips clips = must(packClips(source.skeleton, source.clips, source.options, &report));
+    result = new dermis_bank(std::move(clips), std::move(report));
+  });
+}
+
+dermis_code dermis_bank_load(const void* bytes, size_t byte_count, dermis_bank** bank,
+                             dermis_error* error) {
+  return guarded(error, [&] {
+    const auto all = array(static_cast<const std::byte*>(bytes), byte_count, "bytes");
+    dermis_bank*& result = required(bank, "bank");
+    result = new dermis_bank(must(PackedClips::fromBytes(all)));
+  });
+}
+
+dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info,
+                                 dermis_error* error) {
+  return guarded(error, [&] {
+    const dermis_bank& known = required(bank, "bank");
+    checkOut(info, "info");
+    dermis_bank_info result{};
+    result.node_count = known.clips.nodeCount();
+    result.bytes = known.clips.bytes().data();
+    result.byte_count = known.clips.bytes().size();
+    result.skin_count = known.clips.skinCount();
+    result.clip_count = known.clips.clipCount();
+    result.mask_count = known.clips.maskCount();
+    result.joint_counts = known.jointCounts.data();
+    result.clips = known.infos.data();
+    result.worst_error = known.report.worstError;
+    result.worst = known.report.worst.c_str();
+    give(info, result);
+  });
+}
+
+dermis_code dermis_sample_pose(const dermis_bank* bank, const dermis_clip_layer* layers,
+                               uint32_t layer_count, uint32_t skin, dermis_joint* joints,
+                               uint32_t joint_count, dermis_error* error) {
+  return guarded(error, [&] {
+    std::vector<ClipLayer> all;
+    appendLayers(array(layers, layer_count, "layers"), all);
+    const std::span<dermis_joint> results = array(joints, joint_count, "joints");
+    must(samplePose(required(bank, "bank").clips, all, skin,
+                    {reinterpret_cast<JointMatrix*>(results.data()), results.size()}));
+  });
+}
+
+dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank, dermis_clips* clips,
+                             dermis_error* error) {
+  return guarded(error, [&] {
+    Scene& target = changedScene(scene);
+    const PackedClips& added = required(bank, "bank").clips;
+    dermis_clips& result = required(clips, "clips");
+    result = handleTo<dermis_clips>(must(target.addClips(added)));
+  });
+}
+
+dermis_code dermis_remove_clips(dermis_scene* scene, dermis_clips clips, dermis_error* error) {
+  return guarded(error, [&] { must(changedScene(scene).removeClips(handleOf(clips))); });
+}
+
+dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips, uint32_t count,
+                               dermis_figure* figures, dermis_error* error) {
+  return guarded(error, [&] {
+    Scene& target = changedScene(scene);
+    const std::span<dermis_figure> results = array(figures, count, "figures");
+    const ClipsHandle bank = handleOf(clips);
+    std::vector<FigureHandle> added;
+    while (added.size() < count) {
+      const Result<FigureHandle> figure = target.addFigure(bank);
+      if (!figure) {
+        for (const FigureHandle other : added) must(target.removeFigure(other));
+        must(figure);
+      }
+      added.push_back(*figure);
+    }
+    for (std::size_t i = 0; i < added.size(); ++i) results[i] = handleTo<dermis_figure>(added[i]);
+  });
+}
+
+dermis_code dermis_remove_figure(dermis_scene* scene, dermis_figure figure, dermis_error* error) {
+  return guarded(error, [&] { must(changedScene(scene).removeFigure(handleOf(figure))); });
+}
+
+dermis_code dermis_figure_pose(const dermis_scene* scene, dermis_figure figure, uint32_t skin,
+                               dermis_pose* pose, dermis_error* error) {
+  return guarded(error, [&] {
+    dermis_pose& result = required(pose, "pose");
+    result = handleTo<dermis_pose>(must(sceneOf(scene).pose(handleOf(figure), skin)));
+  });
+}
+
+dermis_code dermis_play_clips(dermis_scene* scene, const dermis_play* plays, uint32_t count,
+                              dermis_error* error) {
+  return guarded(error, [&] {
+    Scene& target = changedScene(scene);
+    const std::span<const dermis_play> all = array(plays, count, "plays");
+    std::vector<ClipLayer> layers;
+    std::vector<FigurePlay> converted;
+    for (const dermis_play& play : all)
+      appendLayers(array(play.layers, play.layer_count, "a figure's layers"), layers);
+    std::size_t first = 0;
+    for (const dermis_play& play : all) {
+      converted.push_back(
+          {handleOf(play.figure), std::span(layers).subspan(first, play.layer_count)});
+      first += play.layer_count;
+    }
+    must(target.play(converted));
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,267 @@
+// The C interface against that of C++: banks of clips, and figures. What both do must be the same
+// to the bit.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "c_helpers.h"
+#include "dermis/clips.h"
+#include "dermis/gltf.h"
+#include "test_paths.h"
+
+namespace dermis::test {
+namespace {
+
+class CClipsTest : public ::testing::Test {
+ protected:
+  CClipsTest() {
+    const std::string path = std::string(sampleModels) + "/figure.glb";
+    dermis_model_source file = sized<dermis_model_source>();
+    file.path = path.c_str();
+    expectOk(dermis_model_load(&file, &model, &error));
+    expectOk(dermis_model_clips(model, &source, &error));
+    expected = must(gltf::load(path));
+    skeleton = gltf::skeleton(expected);
+    clips = gltf::clips(expected);
+  }
+  /// Packs both.
+  PackedClips pack(Owned<dermis_bank>& bank, const PackClipsOptions& options = {}) {
+    expectOk(dermis_pack_clips(&source, &bank, &error));
+    PackedClips same = must(packClips(skeleton, clips, options, &report));
+    dermis_bank_info info = sized<dermis_bank_info>();
+    expectOk(dermis_bank_contents(bank, &info, &error));
+    EXPECT_EQ(info.byte_count, same.bytes().size());
+    EXPECT_TRUE(isSame(info.bytes, same.bytes().data(), same.bytes().size()));
+    EXPECT_EQ(info.worst_error, report.worstError);
+    EXPECT_EQ(info.worst, report.worst);
+    return same;
+  }
+  void expectRefused(const std::string& part) {
+    Owned<dermis_bank> none;
+    expectError(dermis_pack_clips(&source, &none, &error), part);
+    EXPECT_EQ(none.object, nullptr);
+  }
+
+  Owned<dermis_model> model;
+  dermis_clips_source source = sized<dermis_clips_source>();
+  gltf::Model expected;
+  Skeleton skeleton;
+  std::vector<ClipView> clips;
+  PackClipsReport report;
+};
+
+TEST_F(CClipsTest, ABankOfAModelIsThatOfCpp) {
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank);
+  dermis_bank_info info = sized<dermis_bank_info>();
+  expectOk(dermis_bank_contents(bank, &info, &error));
+  EXPECT_EQ(info.node_count, same.nodeCount());
+  ASSERT_EQ(info.skin_count, same.skinCount());
+  EXPECT_EQ(info.joint_counts[0], same.jointCount(0));
+  ASSERT_EQ(info.clip_count, clips.size());
+  EXPECT_EQ(info.mask_count, 0u);
+  for (std::uint32_t clip = 0; clip < info.clip_count; ++clip) {
+    EXPECT_EQ(info.clips[clip].duration, same.clip(clip).duration);
+    EXPECT_EQ(info.clips[clip].is_clamped, 0u);
+    EXPECT_EQ(info.clips[clip].is_additive, 0u);
+  }
+  Owned<dermis_bank> loaded;
+  expectOk(dermis_bank_load(info.bytes, info.byte_count, &loaded, &error));
+  dermis_bank_info again = sized<dermis_bank_info>();
+  expectOk(dermis_bank_contents(loaded, &again, &error));
+  EXPECT_TRUE(isSame(again.bytes, info.bytes, info.byte_count));
+  EXPECT_EQ(again.worst_error, 0);
+  EXPECT_STREQ(again.worst, "");
+  expectError(dermis_bank_load(info.bytes, info.byte_count - 4, &loaded, &error), "",
+              DERMIS_INVALID_DATA);
+}
+
+TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
+  const std::size_t nodes = skeleton.nodes.size();
+  std::vector<float> masks(2 * nodes, 0.5f);
+  masks[nodes + 1] = 0;
+  std::vector<dermis_clip_view> views(source.clips, source.clips + source.clip_count);
+  ASSERT_GE(views.size(), 2u);
+  views[0].is_clamped = 1;
+  views[1].is_additive = 1;
+  views[1].base_clip = 1;
+  views[1].base_time = 0.25;
+  source.clips = views.data();
+  source.masks = masks.data();
+  source.mask_count = 2;
+  source.max_error = 0.01;
+  dermis_primitive primitive = sized<dermis_primitive>();
+  expectOk(dermis_model_primitive(model, 0, &primitive, &error));
+  source.meshes = primitive.mesh;
+  ASSERT_EQ(source.skin_count, 1u);
+
+  clips[0].wraps = false;
+  clips[1].additive = true;
+  clips[1].baseClip = 0;
+  clips[1].baseTime = 0.25;
+  const std::array<std::span<const float>, 2> spans{std::span(masks).first(nodes),
+                                                    std::span(masks).subspan(nodes)};
+  const gltf::SkinnedPrimitive& skinned = expected.skinnedPrimitives[0];
+  const gltf::PrimitiveView view(expected.meshes[skinned.mesh].primitives[skinned.primitive]);
+  const JointBounds reach = must(jointBounds(view.mesh(), primitive.joint_count));
+  const std::array<const JointBounds*, 1> meshes{&reach};
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank, {.maxError = 0.01, .meshes = meshes, .masks = spans});
+  dermis_bank_info info = sized<dermis_bank_info>();
+  expectOk(dermis_bank_contents(bank, &info, &error));
+  EXPECT_EQ(info.mask_count, 2u);
+  EXPECT_EQ(info.clips[0].is_clamped, 1u);
+  EXPECT_EQ(info.clips[1].is_additive, 1u);
+
+  const std::array<dermis_clip_layer, 2> layers{{{7.3, 0.5f, 0, 0, 1}, {0.6, -0.25f, 1, 2, 0}}};
+  const std::array<ClipLayer, 2> sameLayers{{{0, 7.3, 0.5f, 0, true}, {1, 0.6, -0.25f, 2, false}}};
+  std::vector<JointMatrix> pose(same.jointCount(0));
+  must(samplePose(same, sameLayers, 0, pose));
+  std::vector<dermis_joint> joints(pose.size());
+  expectOk(
+      dermis_sample_pose(bank, layers.data(), 2, 0, joints.data(), primitive.joint_count, &error));
+  EXPECT_TRUE(isSame(joints.data(), pose.data(), sizeof(JointMatrix) * pose.size()));
+  expectError(
+      dermis_sample_pose(bank, layers.data(), 2, 1, joints.data(), primitive.joint_count, &error),
+      "there is no skin 1");
+  expectError(dermis_sample_pose(bank, nullptr, 2, 0, joints.data(), 1, &error), "layers is null");
+}
+
+TEST_F(CClipsTest, ZerosAreTheDefaultsOfANode) {
+  const double matrix[12] = {1, 0, 0, 0.5, 0, 2, 0, 0, 0, 0, 1, 0};
+  std::array<dermis_node, 3> nodes{sized<dermis_node>(), sized<dermis_node>(),
+                                   sized<dermis_node>()};
+  nodes[1].parent = 1;
+  nodes[1].translation[1] = 3;
+  nodes[2].parent = 2;
+  nodes[2].matrix = matrix;
+  const std::array<std::uint32_t, 2> joints{2, 1};
+  std::array<dermis_joint, 2> inverse{};
+  for (dermis_joint& joint : inverse) {
+    const JointMatrix identity;
+    std::memcpy(&joint, &identity, sizeof(joint));
+  }
+  dermis_skin skin{sizeof(dermis_skin), 2, nullptr, joints.data(), inverse.data()};
+  source = sized<dermis_clips_source>();
+  source.nodes = nodes.data();
+  source.node_count = 3;
+  source.skins = &skin;
+  source.skin_count = 1;
+  Owned<dermis_bank> bank;
+  expectOk(dermis_pack_clips(&source, &bank, &error));
+  std::array<JointMatrix, 2> pose;
+  expectOk(dermis_sample_pose(bank, nullptr, 0, 0, reinterpret_cast<dermis_joint*>(pose.data()), 2,
+                              &error));
+  EXPECT_EQ(pose[0].m[0][3], 0.5f);
+  EXPECT_EQ(pose[0].m[1][1], 2.0f);
+  EXPECT_EQ(pose[0].m[1][3], 3.0f);
+  EXPECT_EQ(pose[1].m[1][1], 1.0f);
+
+  // What is wrong is said.
+  source.skin_count = 0;
+  expectRefused("there are no skins");
+  source.skin_count = 1;
+  nodes[1].size = 3;
+  expectRefused("nodes[1]");
+  nodes[1].size = sizeof(dermis_node);
+  nodes[0].parent = 3;
+  expectRefused("cycle");
+  nodes[0].parent = 0;
+  source.mask_count = 1;
+  expectRefused("masks is null");
+  source.mask_count = 0;
+  dermis_channel channel = sized<dermis_channel>();
+  channel.path = static_cast<dermis_channel_path>(4);
+  dermis_clip_view clip = sized<dermis_clip_view>();
+  clip.channels = &channel;
+  clip.channel_count = 1;
+  source.clips = &clip;
+  source.clip_count = 1;
+  expectRefused("a channel's path is 4");
+  channel.path = DERMIS_CHANNEL_SCALE;
+  channel.interpolation = static_cast<dermis_interpolation>(3);
+  expectRefused("a channel's interpolation is 3");
+  channel.interpolation = DERMIS_INTERPOLATION_STEP;
+  channel.key_count = 1;
+  expectRefused("a channel's times is null");
+}
+
+TEST_F(CClipsTest, FiguresPlay) {
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank);
+  Owned<dermis_runner> runner;
+  expectOk(dermis_runner_create(nullptr, &runner, &error));
+  dermis_scene* const scene = dermis_runner_scene(runner);
+  dermis_clips clipsOfScene{};
+  expectOk(dermis_add_clips(scene, bank, &clipsOfScene, &error));
+  std::array<dermis_figure, 3> figures{};
+  expectOk(dermis_add_figures(scene, clipsOfScene, 3, figures.data(), &error));
+
+  dermis_primitive primitive = sized<dermis_primitive>();
+  expectOk(dermis_model_primitive(model, 0, &primitive, &error));
+  Owned<dermis_packed> packed;
+  expectOk(dermis_pack(primitive.mesh, primitive.joint_count, &packed, &error));
+  dermis_instance_desc desc = sized<dermis_instance_desc>();
+  expectOk(dermis_add_mesh(scene, packed, &desc.mesh, &error));
+  expectOk(dermis_figure_pose(scene, figures[0], 0, &desc.pose, &error));
+  const dermis_pose first = desc.pose;
+  dermis_instance instance{};
+  expectOk(dermis_add_instance(scene, &desc, &instance, &error));
+  // A pose that the caller writes, for comparison.
+  dermis_pose_desc written = sized<dermis_pose_desc>();
+  written.joint_count = primitive.joint_count;
+  expectOk(dermis_add_poses(scene, &written, 1, &desc.pose, &error));
+  dermis_instance other{};
+  expectOk(dermis_add_instance(scene, &desc, &other, &error));
+
+  expectOk(dermis_begin_frame(scene, 1, 0, &error));
+  const std::array<dermis_clip_layer, 2> layers{{{0.4, 0.75f, 0, 0, 0}, {1.9, 0.25f, 1, 0, 1}}};
+  const std::array<dermis_play, 2> plays{
+      {{figures[1], 0, nullptr}, {figures[0], 2, layers.data()}}};
+  expectOk(dermis_play_clips(scene, plays.data(), 2, &error));
+  const std::array<ClipLayer, 2> sameLayers{{{0, 0.4, 0.75f}, {1, 1.9, 0.25f, 0, true}}};
+  dermis_joint* memory = nullptr;
+  expectOk(dermis_write_poses(scene, &desc.pose, 1, &memory, nullptr, &error));
+  must(samplePose(same, sameLayers, 0,
+                  {reinterpret_cast<JointMatrix*>(memory), primitive.joint_count}));
+  dermis_runner_frame frame = sized<dermis_runner_frame>();
+  expectOk(dermis_runner_jobs(runner, 0, &frame, &error));
+  for (std::uint32_t job = 0; job < frame.job_count; ++job)
+    expectOk(dermis_run_job(runner, job, &error));
+  std::array<dermis_instance_info, 2> infos{sized<dermis_instance_info>(),
+                                            sized<dermis_instance_info>()};
+  expectOk(dermis_instance_contents(scene, instance, &infos[0], &error));
+  expectOk(dermis_instance_contents(scene, other, &infos[1], &error));
+  const auto* output = static_cast<const std::byte*>(frame.output);
+  EXPECT_EQ(infos[0].is_written, 1u);
+  EXPECT_TRUE(isSame(output + infos[0].offset, output + infos[1].offset,
+                     12 * std::size_t{primitive.mesh->vertex_count}));
+  dermis_scene_info info = sized<dermis_scene_info>();
+  expectOk(dermis_scene_contents(scene, &info, &error));
+  EXPECT_EQ(info.sampled_figures, 1u);
+
+  expectError(dermis_play_clips(scene, nullptr, 1, &error), "plays is null");
+  dermis_play wrong = plays[1];
+  wrong.layer_count = 5;
+  const std::array<dermis_clip_layer, 5> many{};
+  wrong.layers = many.data();
+  expectError(dermis_play_clips(scene, &wrong, 1, &error), "entry 0: there are 5 layers");
+  expectError(dermis_remove_clips(scene, clipsOfScene, &error), "is used by 3 figures");
+  expectError(dermis_remove_figure(scene, figures[0], &error), "is used by 1 instance");
+  expectError(dermis_figure_pose(scene, figures[0], 1, &desc.pose, &error), "has no skin 1");
+  expectOk(dermis_begin_frame(scene, 2, 1, &error));
+  expectError(dermis_write_poses(scene, &first, 1, &memory, nullptr, &error), "belongs to figure");
+  dermis_figure misused{};
+  std::memcpy(&misused, &clipsOfScene, sizeof(misused));
+  expectError(dermis_remove_figure(scene, misused, &error), "this is the handle of clips");
+  expectOk(dermis_remove_instance(scene, instance, &error));
+  for (const dermis_figure figure : figures) expectOk(dermis_remove_figure(scene, figure, &error));
+  expectError(dermis_remove_figure(scene, figures[0], &error), "it was removed");
+  expectOk(dermis_remove_clips(scene, clipsOfScene, &error));
+  expectError(dermis_add_figures(scene, clipsOfScene, 2, figures.data(), &error), "it was removed");
+}
+
+}  // namespace
+}  // namespace dermis::test
