@@ -165,7 +165,6 @@ DERMIS_CONSTANT CLIPS_OFFSETS = 8u;  // words: the offsets of nodes, skins, clip
 DERMIS_CONSTANT CLIP_NODE_WORDS = 16u;
 DERMIS_CONSTANT CLIP_WORDS = 8u;
 DERMIS_CONSTANT CLIP_CLASS_WORDS = 8u;
-DERMIS_CONSTANT CLIP_ADDITIVE = 2u;  // in the flags of a clip
 DERMIS_CONSTANT TRACK_COLUMN_BITS = 22u;
 // The word of a node: by which matrix of the figure its transform is multiplied from the left.
 DERMIS_CONSTANT CLIP_ROOT = 0xffffffffu;    // by none
@@ -209,7 +208,7 @@ struct FigureRecord {
   uint layerCount;
   uint reserved;
   float time0;  // seconds inside the clip
-  uint layer0;  // clip, 10 bits; mask, 5 bits; a 0; weight as float16
+  uint layer0;  // clip, 10 bits; mask, 5 bits; LAYER_ADDITIVE; weight as float16
   float time1;
   uint layer1;
   float time2;
@@ -218,6 +217,7 @@ struct FigureRecord {
   uint layer3;
 };
 DERMIS_CONSTANT FIGURE_WORDS = 12u;
+DERMIS_CONSTANT LAYER_ADDITIVE = 0x8000u;
 DERMIS_CONSTANT UNITS_OF_TRANSFORM = 3u;  // the rows of a 3×4 matrix
 
 // The unit at the beginning of a palette. The same as PoseStatus.

@@ -5,8 +5,18 @@
 #include "abi.h"
 #include "quaternion.glsl"
 
+#ifdef TEXELS
+#include "cpu_device/texels.glsl"
+
+uvec4 clipUnit(uint unit) { return meshUnit(unit); }
+uint clipWord(uint word) { return meshWord(word); }
+#else
 layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Clips { uint clipWords[]; };
 layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer ClipUnits { uvec4 clipUnits[]; };
+
+uvec4 clipUnit(uint unit) { return clipUnits[unit]; }
+uint clipWord(uint word) { return clipWords[word]; }
+#endif
 
 // What is animated, by number.
 const uint PATH_TRANSLATION = 0u;
@@ -22,7 +32,7 @@ struct Transform {
 
 Transform loadTransform(uint word) {
   uint unit = word / 4u;
-  return Transform(uintBitsToFloat(clipUnits[unit]), uintBitsToFloat(clipUnits[unit + 1u]), uintBitsToFloat(clipUnits[unit + 2u]));
+  return Transform(uintBitsToFloat(clipUnit(unit)), uintBitsToFloat(clipUnit(unit + 1u)), uintBitsToFloat(clipUnit(unit + 2u)));
 }
 
 vec4 rowTimes(vec4 row, Transform b) {
@@ -52,8 +62,8 @@ struct Key {
 // `half` counts 16 bits from the beginning of the mesh buffer. A key of size 0, 1 or 2 has 2, 3 or 4 of them.
 Key loadKey(uint firstHalf, uint size, bool isRotation) {
   uint word = firstHalf / 2u;
-  uint low = clipWords[word];
-  uint high = clipWords[word + min(size, 1u)];
+  uint low = clipWord(word);
+  uint high = clipWord(word + min(size, 1u));
   if (size == 0u) return Key((uvec3(low) >> uvec3(0u, 10u, 20u)) & 1023u, low >> 30u);
   if (size == 1u) {
     bool isOdd = firstHalf % 2u == 1u;
@@ -95,8 +105,8 @@ struct ClipTime {
 
 vec4 sampleKeys(ClipTime at, uint keyClass, uint column, bool isRotation) {
   uint unit = (at.clips + at.classes + keyClass * CLIP_CLASS_WORDS) / 4u;
-  uvec4 a = clipUnits[unit];        // format, level, number of keys, number of columns
-  uvec4 b = clipUnits[unit + 1u];   // keys, halves of a row, ranges, jumps
+  uvec4 a = clipUnit(unit);        // format, level, number of keys, number of columns
+  uvec4 b = clipUnit(unit + 1u);   // keys, halves of a row, ranges, jumps
   uint size = a.x & 3u;
   // A power of two, which a division need not give exactly.
   precise float position = at.frame * uintBitsToFloat((127u - a.y) << 23u);
@@ -105,7 +115,7 @@ vec4 sampleKeys(ClipTime at, uint keyClass, uint column, bool isRotation) {
   uint row = uint(interval);
   if (b.w != 0u) {
     uint word = at.clips + b.w + row * ((a.w + 3u) / 4u) + column / 4u;
-    uint jump = clipWords[word] >> (column % 4u * 8u) & 255u;
+    uint jump = clipWord(word) >> (column % 4u * 8u) & 255u;
     precise float part = fraction * 256.0;
     if (jump != 0u) fraction = part >= float(jump + 1u) ? 1.0 : 0.0;
   }
@@ -120,9 +130,9 @@ vec4 sampleKeys(ClipTime at, uint keyClass, uint column, bool isRotation) {
     precise vec4 mixed = rest * p + share * q;
     return unitOrIdentity(mixed);
   }
-  uint range = at.clips + b.z + 6u * column;
-  vec3 least = uintBitsToFloat(uvec3(clipWords[range], clipWords[range + 1u], clipWords[range + 2u]));
-  vec3 scale = uintBitsToFloat(uvec3(clipWords[range + 3u], clipWords[range + 4u], clipWords[range + 5u]));
+  uint range = (at.clips + b.z) / 4u + 2u * column;
+  vec3 least = uintBitsToFloat(clipUnit(range).xyz);
+  vec3 scale = uintBitsToFloat(clipUnit(range + 1u).xyz);
   precise vec3 p = least + vec3(from.values) * scale;
   precise vec3 q = least + vec3(to.values) * scale;
   precise vec3 mixed = rest * p + fraction * q;
@@ -135,8 +145,8 @@ vec4 sampleTrack(ClipTime at, uint word, bool isRotation, vec4 still) {
   if (kind == 0u) return still;
   if (kind == 1u) {
     uint value = at.clips + (word & 0x3fffffffu);
-    return uintBitsToFloat(uvec4(clipWords[value], clipWords[value + 1u], clipWords[value + 2u],
-                                 isRotation ? clipWords[value + 3u] : 0u));
+    return uintBitsToFloat(uvec4(clipWord(value), clipWord(value + 1u), clipWord(value + 2u),
+                                 isRotation ? clipWord(value + 3u) : 0u));
   }
   return sampleKeys(at, word >> TRACK_COLUMN_BITS & 255u, word & ((1u << TRACK_COLUMN_BITS) - 1u), isRotation);
 }

@@ -17,10 +17,16 @@ layout(push_constant) uniform Push { ComposePush push; };
 layout(set = 0, binding = BINDING_PALETTES, std430) buffer Transforms { uvec4 transforms[]; };
 layout(set = 0, binding = BINDING_POSITIONS, std430) restrict writeonly buffer Joints { uvec4 joints[]; };
 
+#ifdef TEXELS
+uvec4 transformUnit(uint unit) { return paletteBits(unit); }
+#else
+uvec4 transformUnit(uint unit) { return transforms[unit]; }
+#endif
+
 Transform transformOf(uint figure, uint matrix) {
   uint unit = figure + matrix * UNITS_OF_TRANSFORM;
-  return Transform(uintBitsToFloat(transforms[unit]), uintBitsToFloat(transforms[unit + 1u]),
-                   uintBitsToFloat(transforms[unit + 2u]));
+  return Transform(uintBitsToFloat(transformUnit(unit)), uintBitsToFloat(transformUnit(unit + 1u)),
+                   uintBitsToFloat(transformUnit(unit + 2u)));
 }
 
 void main() {
@@ -28,7 +34,7 @@ void main() {
   if (number >= push.workgroupCount) return;
   uvec4 figure = tableUnit(push.figures + number * FIGURE_WORDS);  // the first words of a FigureRecord
   for (uint index = gl_LocalInvocationID.x; index < push.stepCount; index += gl_WorkGroupSize.x) {
-    uvec4 unit = clipUnits[push.steps / 4u + index];
+    uvec4 unit = clipUnit(push.steps / 4u + index);
     StepRecord step = StepRecord(unit.x, unit.y, unit.z, unit.w);
     bool isJoint = step.matrix != 0u;
     uint matrix = step.node;
@@ -37,12 +43,12 @@ void main() {
       product = loadTransform(push.clips + step.matrix);
     } else {
       product = transformOf(figure.x, matrix);
-      matrix = clipWords[push.above + matrix];
+      matrix = clipWord(push.above + matrix);
     }
     while (matrix != CLIP_ROOT) {
       product = multiply(transformOf(figure.x, matrix & ~CLIP_GLOBAL), product);
       if ((matrix & CLIP_GLOBAL) != 0u) break;
-      matrix = clipWords[push.above + matrix];
+      matrix = clipWord(push.above + matrix);
     }
     uvec4 r0 = floatBitsToUint(product.r0);
     uvec4 r1 = floatBitsToUint(product.r1);

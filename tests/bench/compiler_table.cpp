@@ -76,8 +76,11 @@ int main(int argc, char** argv) {
     for (const Row& row : rows()) {
       for (const Method method : allMethods) {
         if (isForComparison(method)) continue;
-        const PipelineNeeds needs{
-            .method = method, .layout = row.layout, .bounds = row.bounds, .culledOnGpu = true};
+        const PipelineNeeds needs{.method = method,
+                                  .layout = row.layout,
+                                  .bounds = row.bounds,
+                                  .culledOnGpu = true,
+                                  .figures = true};
         for (const PipelineId id : samples::must(pipelines(needs, limits, Tuning{}))) {
           if (!seen.insert(id).second) continue;
           const auto pipeline = samples::must(vulkan::pipelineDescription(id));

@@ -107,8 +107,8 @@ std::string moduleName(const Variant& variant) {
     return variant.method == Method::logMatrix ? "palette_logarithms" : "palette";
   if (variant.kernel == Kernel::clear) return "clear";
   if (variant.kernel == Kernel::visibility) return "visibility";
-  if (variant.kernel == Kernel::sample) return "sample";
-  if (variant.kernel == Kernel::compose) return "compose";
+  if (variant.kernel == Kernel::sample) return variant.texels ? "sample_texels" : "sample";
+  if (variant.kernel == Kernel::compose) return variant.texels ? "compose_texels" : "compose";
   std::string name = "skin";
   if (isForComparison(variant.method)) name += "_comparison";
   if (isAgainstBulge(variant.method)) name += "_bulge";

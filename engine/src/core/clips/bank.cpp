@@ -80,7 +80,7 @@ class BankCheck {
            keys.keyCount <= mostKeys && columns > 0 && columns < 1u << trackColumnBits &&
            keys.rowHalves % 2 == 0 && keys.rowHalves >= columns * format.halves() &&
            isSection(keys.keys, keys.keyCount * std::uint64_t{keys.rowHalves / 2}) &&
-           (format.isRotation || areFinite(keys.ranges, 6 * columns)) &&
+           (format.isRotation || (keys.ranges % 4 == 0 && areFinite(keys.ranges, 8 * columns))) &&
            (keys.jumps == 0 || isSection(keys.jumps, intervals * ((columns + 3) / 4)));
   }
 

@@ -60,7 +60,7 @@ struct BankClass {
   std::uint32_t keyCount, columnCount;
   std::uint32_t keys;
   std::uint32_t rowHalves;  ///< 16-bit halves of a row, an even number
-  std::uint32_t ranges;     ///< for each column 3 minima, then 3 steps; 0 for rotations
+  std::uint32_t ranges;     ///< for each column 3 minima, a 0, 3 steps, a 0; 0 for rotations
   std::uint32_t jumps;      ///< for each interval a byte a column, in whole words; 0: none
 };
 
@@ -154,11 +154,11 @@ inline std::array<float, 4> rotationOf(const KeyBits& key, KeyFormat format) {
   return q;
 }
 
-/// `range`: 3 minima, then 3 steps.
-inline std::array<float, 4> vectorOf(const KeyBits& key, std::span<const float, 6> range) {
+/// `range`: 3 minima, a 0, 3 steps, a 0.
+inline std::array<float, 4> vectorOf(const KeyBits& key, std::span<const float, 8> range) {
   std::array<float, 4> v{};
   for (std::size_t i = 0; i < 3; ++i)
-    v[i] = range[i] + static_cast<float>(key.values[i]) * range[3 + i];
+    v[i] = range[i] + static_cast<float>(key.values[i]) * range[4 + i];
   return v;
 }
 

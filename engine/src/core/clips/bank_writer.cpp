@@ -161,7 +161,7 @@ class BankWriter {
     record.columnCount = static_cast<std::uint32_t>(columns.size());
     record.rowHalves = (record.columnCount * first.format.halves() + 1) / 2 * 2;
     record.keys = reserve(std::size_t{record.keyCount} * record.rowHalves / 2);
-    if (!first.format.isRotation) record.ranges = reserve(6 * columns.size());
+    if (!first.format.isRotation) record.ranges = reserveUnits(8 * columns.size());
     const std::size_t jumpWords = (columns.size() + 3) / 4;
     if (!first.jumps.empty()) record.jumps = reserve(first.jumps.size() * jumpWords);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -171,7 +171,7 @@ class BankWriter {
                  2 * std::size_t{record.keys} + row * record.rowHalves + c * track.format.halves(),
                  track.format, track.keys[row]);
       }
-      if (!track.format.isRotation) put(record.ranges + 6 * c, track.range);
+      if (!track.format.isRotation) put(record.ranges + 8 * c, track.range);
       for (std::size_t k = 0; k < track.jumps.size(); ++k)
         words_[record.jumps + k * jumpWords + c / 4] |= std::uint32_t{track.jumps[k]} << c % 4 * 8;
     }

@@ -77,8 +77,8 @@ Float4 sampleKeys(const ClipBank& bank, const Layer& layer, std::uint32_t word) 
     const Float4 a = rotationOf(from, format), b = rotationOf(to, format);
     return normalized(mix(a, 1 - fraction, b, dot(a, b) < 0 ? -fraction : fraction));
   }
-  std::array<float, 6> range;
-  std::memcpy(range.data(), &bank.words[keys.ranges + 6 * column], sizeof(range));
+  std::array<float, 8> range;
+  std::memcpy(range.data(), &bank.words[keys.ranges + 8 * column], sizeof(range));
   return mix(vectorOf(from, range), 1 - fraction, vectorOf(to, range), fraction);
 }
 
@@ -205,7 +205,9 @@ Result<PackedLayers> packLayers(const PackedClips& clips, std::span<const ClipLa
     if (layer.weight < 0 && weight != 0x8000 && !info.additive)
       return wrong("its weight is negative, and its clip is not additive");
     PackedLayer& place = info.additive ? additive[additives++] : result.layers[result.count++];
-    place = {clipTime(info, layer.time, layer.hold), layer.clip | layer.mask << 10 | weight << 16};
+    place = {
+        clipTime(info, layer.time, layer.hold),
+        layer.clip | layer.mask << 10 | (info.additive ? abi::LAYER_ADDITIVE : 0u) | weight << 16};
   }
   std::copy_n(additive.begin(), additives, result.layers.begin() + result.count);
   result.count += additives;

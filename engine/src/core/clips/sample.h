@@ -16,7 +16,7 @@ namespace dermis {
 /// A layer whose time is inside its clip.
 struct PackedLayer {
   float time = 0;          ///< seconds
-  std::uint32_t bits = 0;  ///< clip, 10 bits; mask, 5 bits; a 0; weight as float16
+  std::uint32_t bits = 0;  ///< as abi::FigureRecord::layer0
 
   std::uint32_t clip() const { return bits & 1023; }
   std::uint32_t mask() const { return bits >> 10 & 31; }

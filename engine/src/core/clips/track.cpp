@@ -39,10 +39,10 @@ KeyBits rotationBits(const Value& q, KeyFormat format) {
   return key;
 }
 
-KeyBits vectorBits(const Value& v, KeyFormat format, const std::array<float, 6>& range) {
+KeyBits vectorBits(const Value& v, KeyFormat format, const std::array<float, 8>& range) {
   KeyBits key{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const double steps = range[3 + i] > 0 ? (v[i] - double{range[i]}) / double{range[3 + i]} : 0;
+    const double steps = range[4 + i] > 0 ? (v[i] - double{range[i]}) / double{range[4 + i]} : 0;
     key.values[i] = static_cast<std::uint32_t>(
         std::clamp(std::round(steps), 0.0, static_cast<double>(format.largest())));
   }
@@ -216,7 +216,7 @@ void quantize(Track& track, const std::vector<Value>& values) {
     }
     for (std::size_t i = 0; i < 3; ++i) {
       track.range[i] = static_cast<float>(low[i]);
-      track.range[3 + i] = static_cast<float>((high[i] - low[i]) / track.format.largest());
+      track.range[4 + i] = static_cast<float>((high[i] - low[i]) / track.format.largest());
     }
   }
   for (const Value& value : values) {

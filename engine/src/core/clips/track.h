@@ -18,7 +18,7 @@ struct Track {
   KeyFormat format;
   int level = 0;  ///< an interval is 2^level / rate
   std::vector<KeyBits> keys;
-  std::array<float, 6> range{};
+  std::array<float, 8> range{};
   std::vector<std::uint8_t> jumps;  ///< one for each interval, as in the bank; or empty
   double error = 0;                 ///< as `ClipError`
 

@@ -128,8 +128,8 @@ Result<void> Encoder::addFigureDispatches() {
     tables.resize(first + figures.records.size() * abi::FIGURE_WORDS);
     std::memcpy(&tables[first], figures.records.data(), std::span(figures.records).size_bytes());
     const abi::SamplePush push{first, 0, figures.bank, figures.clips->nodeCount};
-    if (Result<void> good =
-            addDispatch(variantOf(Kernel::sample, limits_, tuning_), figures.records.size(), push);
+    if (Result<void> good = addDispatch(figureVariant(Kernel::sample, limits_, tuning_),
+                                        figures.records.size(), push);
         !good)
       return good;
     paletteStage_ =
@@ -149,7 +149,7 @@ Result<void> Encoder::addFigureDispatches() {
                                   figures.kernelWords,
                                   figures.kernelWords + clips.firstStep + begin * abi::STEP_WORDS,
                                   clips.bandEnds[band] - begin};
-      if (Result<void> good = addDispatch(variantOf(Kernel::compose, limits_, tuning_),
+      if (Result<void> good = addDispatch(figureVariant(Kernel::compose, limits_, tuning_),
                                           figures.records.size(), push);
           !good)
         return good;
@@ -563,7 +563,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     };
     texels(abi::BINDING_TABLE_TEXELS, tables);
     texels(abi::BINDING_MESH_TEXELS, buffers[BufferRole::meshes]);
-    texels(abi::BINDING_PALETTE_TEXELS, joints);
+    const bool writesPoses = variant.kernel == Kernel::compose;
+    texels(abi::BINDING_PALETTE_TEXELS, writesPoses ? buffers[BufferRole::palettes] : joints);
   }
   auto& command = std::get<DispatchCommand>(
       plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));

@@ -213,6 +213,12 @@ Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tunin
   return variant;
 }
 
+Variant figureVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning) {
+  Variant variant = variantOf(kernel, limits, tuning);
+  variant.texels = storesWidely(limits);
+  return variant;
+}
+
 Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
                        const Tuning& tuning) {
   Variant variant = variantOf(Kernel::palette, limits, tuning);
@@ -311,7 +317,7 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   // `placeVertices` aligns what it places.
   appendForms(layoutVariant(job, limits, tuning), ranges, variants);
   for (const Kernel kernel : {Kernel::sample, Kernel::compose}) {
-    if (needs.figures) variants.push_back(variantOf(kernel, limits, tuning));
+    if (needs.figures) variants.push_back(figureVariant(kernel, limits, tuning));
   }
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));
   return idsOf(variants);

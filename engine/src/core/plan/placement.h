@@ -82,6 +82,8 @@ Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimit
                        const Tuning& tuning);
 /// The clear or the visibility kernel.
 Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
+/// Of the kernels that sample clips.
+Variant figureVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The skin kernel for a job, except for the members that `chooseForm` sets. It depends on nothing
 /// else in the batch.

@@ -1,0 +1,161 @@
+// What clips cost in a SceneRecorder: figures of a model, each with a pair of clips and a phase of
+// its own, all blended and sampled in each frame, beside the cost of skinning 3,000 vertices with
+// poses that the CPU writes. Process CPU time of the best of several frames, and the CPU's share:
+// `play`, plan and record.
+//
+//   dermis_clips_benchmark MODEL [FIGURES [FRAMES]]
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <span>
+#include <vector>
+
+#include "dermis/clips.h"
+#include "dermis/gltf.h"
+#include "kit/device.h"
+#include "kit/random_rig.h"
+#include "system_engine.h"
+
+namespace dermis::bench {
+namespace {
+
+using test::must;
+
+double processSeconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Figures with an instance each.
+class Figures {
+ public:
+  Figures(samples::OpenDevice& open, const PackedClips& bank, std::uint32_t count,
+          std::uint32_t vertexCount, bool areSampled)
+      : bank_(bank), engine_(*open.device, open.context, description(open, count, vertexCount)) {
+    const std::uint32_t joints = bank.jointCount(0);
+    pose_ = samples::randomPose(1, joints, samples::Rigidity::rigid);
+    engine_.begin();
+    InstanceDescription instance;
+    instance.layout.normals = VertexFormat::float32x3;
+    instance.mesh =
+        engine_.addMesh(must(pack(samples::randomMesh(1, vertexCount, joints, 4).view(), joints)));
+    const ClipsHandle clips = must(engine_->addClips(PackedClips(bank)));
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (areSampled) {
+        figures_.push_back(must(engine_->addFigure(clips)));
+        instance.pose = must(engine_->pose(figures_.back()));
+      } else {
+        instance.pose =
+            poses_.emplace_back(engine_.addPose(pose_, {.promise = JointPromise::scaling}));
+      }
+      if (i == 0) must(engine_.recorder().prepare(instance));
+      must(engine_->addInstance(instance));
+    }
+    engine_.submit();
+  }
+
+  struct Cost {
+    double all = 1e9, engine = 1e9;  ///< seconds
+  };
+  Cost run(std::uint32_t frames) {
+    Cost best;
+    for (std::uint32_t frame = 0; frame < frames; ++frame) {
+      engine_.begin();
+      engine_.finish();
+      const double begin = processSeconds();
+      for (const PoseHandle pose : poses_) engine_.writePose(pose, pose_);
+      const auto beforePlay = std::chrono::steady_clock::now();
+      play(frame);
+      const std::chrono::duration<double> played = std::chrono::steady_clock::now() - beforePlay;
+      engine_.submit();
+      engine_.finish();
+      best.all = std::min(best.all, processSeconds() - begin);
+      const test::LastFrame last = engine_.lastFrame();
+      best.engine = std::min(best.engine, played.count() + last.planSeconds + last.recordSeconds);
+    }
+    return best;
+  }
+
+ private:
+  static vulkan::SceneRecorderDescription description(samples::OpenDevice& open,
+                                                      std::uint32_t count,
+                                                      std::uint32_t vertexCount) {
+    vulkan::SceneRecorderDescription description;
+    description.tuning = open.context.tuning();
+    description.scene.instanceCapacity.initial = count;
+    description.scene.boundsCapacity = Capacity::fixed(0);
+    description.scene.outputCapacity.initial = std::uint64_t{count} * (24 * vertexCount + 256);
+    return description;
+  }
+  void play(std::uint32_t frame) {
+    layers_.clear();
+    plays_.clear();
+    layers_.reserve(2 * figures_.size());
+    const std::uint32_t clips = bank_.clipCount();
+    for (std::uint32_t i = 0; i < figures_.size(); ++i) {
+      const double time = 0.37 * i + frame / 60.0;
+      layers_.push_back({i % clips, time, 0.7f});
+      layers_.push_back({(i / clips + 1 + i) % clips, 1.3 * time, 0.3f});
+      plays_.push_back({figures_[i], std::span(layers_).last(2)});
+    }
+    must(engine_->play(plays_));
+  }
+
+  const PackedClips& bank_;
+  test::SystemEngine engine_;
+  std::vector<JointMatrix> pose_;
+  std::vector<PoseHandle> poses_;
+  std::vector<FigureHandle> figures_;
+  std::vector<ClipLayer> layers_;
+  std::vector<FigurePlay> plays_;
+};
+
+std::uint32_t numberOr(int argc, char** argv, int place, std::uint32_t otherwise) {
+  if (argc > place) std::from_chars(argv[place], argv[place] + std::strlen(argv[place]), otherwise);
+  return otherwise;
+}
+
+int run(int argc, char** argv) {
+  if (argc < 2) {
+    fmt::print(stderr, "dermis_clips_benchmark MODEL [FIGURES [FRAMES]]\n");
+    return 2;
+  }
+  const std::uint32_t count = numberOr(argc, argv, 2, 1000), frames = numberOr(argc, argv, 3, 8);
+  const gltf::Model model = must(gltf::load(argv[1]));
+  PackClipsReport report;
+  const Skeleton skeleton = gltf::skeleton(model);
+  const PackedClips bank = must(packClips(skeleton, gltf::clips(model), {}, &report));
+  samples::OpenDevice open = must(samples::openDevice({}));
+  fmt::print("{}; {} clips of {} joints in {} bytes; {} figures\n", open.device->info().name,
+             bank.clipCount(), bank.jointCount(0), report.byteCount, count);
+  constexpr std::uint32_t few = 3, many = 3000;
+  const auto cost = [&](std::uint32_t vertices, bool areSampled) {
+    return Figures(open, bank, count, vertices, areSampled).run(frames);
+  };
+  const Figures::Cost sampled = cost(few, true), written = cost(few, false),
+                      skinned = cost(many, false);
+  const double perFigure = 1e6 / count;
+  fmt::print(
+      "us a figure: sampled and converted {:.2f}, written and converted {:.2f}, with {} vertices "
+      "{:.2f}\n",
+      sampled.all * perFigure, written.all * perFigure, many, skinned.all * perFigure);
+  fmt::print("sampled - written / with {} vertices: {:.3f}; sampled / with {} vertices: {:.3f}\n",
+             many, (sampled.all - written.all) / skinned.all, many, sampled.all / skinned.all);
+  fmt::print("play, plan and record: {:.3f} us a figure; written: {:.3f}\n",
+             sampled.engine * perFigure, written.engine * perFigure);
+  return 0;
+}
+
+}  // namespace
+}  // namespace dermis::bench
+
+int main(int argc, char** argv) {
+  return dermis::bench::run(argc, argv);
+}
