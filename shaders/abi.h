@@ -200,13 +200,30 @@ DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
 DERMIS_CONSTANT UNITS_OF_SCALE_SHEAR = 2u;
 
+// A bank that figures play, and for each band of its nodes a BandRecord. Offsets count words of the
+// mesh buffer.
+struct BankRecord {
+  uint clips;  // the bank
+  uint nodeCount;
+  uint above;  // the words of the nodes
+  uint reserved;
+};
+DERMIS_CONSTANT BANK_WORDS = 4u;
+struct BandRecord {
+  uint steps;
+  uint stepCount;
+  uint reserved0;
+  uint reserved1;
+};
+DERMIS_CONSTANT BAND_WORDS = 4u;
+
 // A figure whose poses are sampled. Layers of additive clips come after the others.
 struct FigureRecord {
   uint
       matrices;  // unit of the palettes buffer: the local transforms of its nodes, then global ones
   uint poses;    // unit of the poses buffer: the joints of its first pose, then those of the others
   uint layerCount;
-  uint reserved;
+  uint bank;    // word offset of its BankRecord
   float time0;  // seconds inside the clip
   uint layer0;  // clip, 10 bits; mask, 5 bits; LAYER_ADDITIVE; weight as float16
   float time1;
@@ -369,20 +386,14 @@ struct PalettePush {
   uint palettes;  // word offset of the palette records
   uint workgroupCount;
 };
-// Offsets of clips are words of the mesh buffer.
 struct SamplePush {
   uint figures;         // word offset of the figure records
   uint workgroupCount;  // one for each figure
-  uint clips;           // the bank
-  uint nodeCount;
 };
 struct ComposePush {
   uint figures;
   uint workgroupCount;
-  uint clips;
-  uint above;  // the words of the nodes
-  uint steps;
-  uint stepCount;
+  uint band;
 };
 struct ClearPush {
   uint results;  // word offset of the list of result indices

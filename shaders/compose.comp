@@ -33,22 +33,24 @@ void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
   uvec4 figure = tableUnit(push.figures + number * FIGURE_WORDS);  // the first words of a FigureRecord
-  for (uint index = gl_LocalInvocationID.x; index < push.stepCount; index += gl_WorkGroupSize.x) {
-    uvec4 unit = clipUnit(push.steps / 4u + index);
+  BankRecord bank = loadBank(figure.w);
+  BandRecord band = loadBand(figure.w + BANK_WORDS + push.band * BAND_WORDS);
+  for (uint index = gl_LocalInvocationID.x; index < band.stepCount; index += gl_WorkGroupSize.x) {
+    uvec4 unit = clipUnit(band.steps / 4u + index);
     StepRecord step = StepRecord(unit.x, unit.y, unit.z, unit.w);
     bool isJoint = step.matrix != 0u;
     uint matrix = step.node;
     Transform product;
     if (isJoint) {
-      product = loadTransform(push.clips + step.matrix);
+      product = loadTransform(bank.clips + step.matrix);
     } else {
       product = transformOf(figure.x, matrix);
-      matrix = clipWord(push.above + matrix);
+      matrix = clipWord(bank.above + matrix);
     }
     while (matrix != CLIP_ROOT) {
       product = multiply(transformOf(figure.x, matrix & ~CLIP_GLOBAL), product);
       if ((matrix & CLIP_GLOBAL) != 0u) break;
-      matrix = clipWord(push.above + matrix);
+      matrix = clipWord(bank.above + matrix);
     }
     uvec4 r0 = floatBitsToUint(product.r0);
     uvec4 r1 = floatBitsToUint(product.r1);

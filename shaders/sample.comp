@@ -22,10 +22,10 @@ uvec2 layerAt(uint word) {
 }
 
 // Of a layer, for a node. `masks`: the offset of the masks in the bank.
-float weightOf(uint bits, uint masks, uint node) {
+float weightOf(uint bits, BankRecord bank, uint masks, uint node) {
   uint mask = bits >> 10u & 31u;
   precise float weight = fromHalf(bits >> 16u);
-  if (mask != 0u) weight = weight * uintBitsToFloat(clipWord(push.clips + masks + (mask - 1u) * push.nodeCount + node));
+  if (mask != 0u) weight = weight * uintBitsToFloat(clipWord(bank.clips + masks + (mask - 1u) * bank.nodeCount + node));
   return weight;
 }
 
@@ -50,11 +50,11 @@ Local meanOf(Local sum, bool hasWeight, Local rest) {
 }
 
 // `offsets` are those of the bank.
-Local sampleNode(uint firstLayer, uint layersEnd, uvec4 offsets, uint node, Local rest) {
+Local sampleNode(uint firstLayer, uint layersEnd, BankRecord bank, uvec4 offsets, uint node, Local rest) {
   precise float weights = 0.0;
   for (uint word = firstLayer; word < layersEnd; word += 2u) {
     uint bits = layerAt(word).y;
-    if ((bits & LAYER_ADDITIVE) == 0u) weights = weights + weightOf(bits, offsets.w, node);
+    if ((bits & LAYER_ADDITIVE) == 0u) weights = weights + weightOf(bits, bank, offsets.w, node);
   }
   Local value = Local(vec4(0.0), vec4(0.0), vec4(0.0));
   vec4 first = vec4(0.0);
@@ -63,18 +63,18 @@ Local sampleNode(uint firstLayer, uint layersEnd, uvec4 offsets, uint node, Loca
   for (uint word = firstLayer; word < layersEnd; word += 2u) {
     uvec2 layer = layerAt(word);
     bool isAdditive = (layer.y & LAYER_ADDITIVE) != 0u;
-    float weight = weightOf(layer.y, offsets.w, node);
+    float weight = weightOf(layer.y, bank, offsets.w, node);
     if (!isAdditive && !(weight > 0.0)) continue;
     if (isAdditive && !isMean) {
       value = meanOf(value, hasWeight, rest);
       isMean = true;
     }
     float share = isAdditive ? weight : quotient(weight, weights);
-    uint unit = (push.clips + offsets.z + (layer.y & 1023u) * CLIP_WORDS) / 4u;
+    uint unit = (bank.clips + offsets.z + (layer.y & 1023u) * CLIP_WORDS) / 4u;
     uvec4 ofClip = clipUnit(unit + 1u);  // offsets of classes and tracks
     precise float frame = uintBitsToFloat(layer.x) * uintBitsToFloat(clipUnit(unit).y);
-    ClipTime at = ClipTime(push.clips, ofClip.x, frame);
-    uint tracks = push.clips + ofClip.y + 3u * node;
+    ClipTime at = ClipTime(bank.clips, ofClip.x, frame);
+    uint tracks = bank.clips + ofClip.y + 3u * node;
     [[dont_unroll]] for (uint path = 0u; path < 3u; ++path) {
       vec4 still = path == PATH_ROTATION ? rest.rotation : path == PATH_SCALE ? rest.scale : rest.translation;
       if (isAdditive) still = path == PATH_ROTATION ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(path == PATH_SCALE ? 1.0 : 0.0);
@@ -104,15 +104,16 @@ void main() {
   uvec4 figure = tableUnit(record);  // the first words of a FigureRecord
   uint firstLayer = record + 4u;
   uint layersEnd = firstLayer + 2u * figure.z;
-  uvec4 offsets = clipUnit((push.clips + CLIPS_OFFSETS) / 4u);
-  for (uint node = gl_LocalInvocationID.x; node < push.nodeCount; node += gl_WorkGroupSize.x) {
-    uint unit = (push.clips + offsets.x + node * CLIP_NODE_WORDS) / 4u;
+  BankRecord bank = loadBank(figure.w);
+  uvec4 offsets = clipUnit((bank.clips + CLIPS_OFFSETS) / 4u);
+  for (uint node = gl_LocalInvocationID.x; node < bank.nodeCount; node += gl_WorkGroupSize.x) {
+    uint unit = (bank.clips + offsets.x + node * CLIP_NODE_WORDS) / 4u;
     uvec4 a = clipUnit(unit);
     vec4 b = uintBitsToFloat(clipUnit(unit + 1u));
     vec4 c = uintBitsToFloat(clipUnit(unit + 2u));
     Local rest = Local(vec4(uintBitsToFloat(a.w), b.xy, 0.0), vec4(b.zw, c.xy),
                        vec4(c.zw, uintBitsToFloat(clipUnit(unit + 3u).x), 0.0));
-    Local sampled = sampleNode(firstLayer, layersEnd, offsets, node, rest);
+    Local sampled = sampleNode(firstLayer, layersEnd, bank, offsets, node, rest);
     vec3 r0;
     vec3 r1;
     vec3 r2;
@@ -121,7 +122,7 @@ void main() {
     precise vec3 s1 = r1 * sampled.scale.xyz;
     precise vec3 s2 = r2 * sampled.scale.xyz;
     Transform local = Transform(vec4(s0, sampled.translation.x), vec4(s1, sampled.translation.y), vec4(s2, sampled.translation.z));
-    if (a.z != 0u) local = multiply(loadTransform(push.clips + a.z), local);
+    if (a.z != 0u) local = multiply(loadTransform(bank.clips + a.z), local);
     uint place = figure.x + node * UNITS_OF_TRANSFORM;
     transforms[place] = floatBitsToUint(local.r0);
     transforms[place + 1u] = floatBitsToUint(local.r1);

@@ -32,12 +32,14 @@ GroupRecord loadGroup(uint word) {
   return GroupRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w);
 }
 
-FigureRecord loadFigure(uint word) {
+BankRecord loadBank(uint word) {
   uvec4 a = tableUnit(word);
-  uvec4 b = tableUnit(word + 4u);
-  uvec4 c = tableUnit(word + 8u);
-  return FigureRecord(a.x, a.y, a.z, a.w, uintBitsToFloat(b.x), b.y, uintBitsToFloat(b.z), b.w, uintBitsToFloat(c.x), c.y,
-                      uintBitsToFloat(c.z), c.w);
+  return BankRecord(a.x, a.y, a.z, a.w);
+}
+
+BandRecord loadBand(uint word) {
+  uvec4 a = tableUnit(word);
+  return BandRecord(a.x, a.y, a.z, a.w);
 }
 
 InstanceRecord loadInstance(uint word) {

@@ -1,8 +1,9 @@
 // What an engine does for a crowd: figures that come and go, each in a clip and phase of its own,
-// in front of a camera that moves. Figures in the distance are skinned less often, figures out of
-// view not at all, and several frames are in flight. Every N-th frame, each vertex of each
-// displayed figure, and its position in the frame before, are compared with the double-precision
-// reference.
+// in front of a camera that moves. The scene samples their poses from the clips. Figures in the
+// distance are skinned less often, figures out of view not at all, and several frames are in
+// flight. Before the first frame, the pose of each tick is compared with the clips of the file.
+// Every N-th frame, each vertex of each displayed figure, and its position in the frame before, are
+// compared with the double-precision reference of these poses.
 //
 //   dermis_crowd --figures 2200 --frames 60
 //   dermis_crowd --device cpu                 the same without Vulkan
@@ -46,6 +47,7 @@
 #include "kit/render/picture.h"
 #include "kit/timestamps.h"
 #include "picture.h"
+#include "tick_poses.h"
 
 namespace {
 
@@ -162,7 +164,7 @@ FigureState stateOf(const Character& character, const World& world, std::uint32_
 
 /// The handles of a figure.
 struct Figure {
-  std::vector<PoseHandle> poses;          ///< by skin
+  FigureHandle handle;
   std::vector<InstanceHandle> instances;  ///< by part; empty: it is not there
   FigureState now;
 
@@ -179,10 +181,11 @@ InstanceDescription describe(const Part& part, const Options& options) {
 }
 
 /// So large that nothing has to grow later.
-SceneDescription describeScene(const Character& character, const Options& options) {
+SceneDescription describeScene(const Character& character, const PackedClips& clips,
+                               const Options& options) {
   SceneDescription scene;
   scene.framesInFlight = options.framesInFlight;
-  scene.meshCapacity.initial = 0;
+  scene.meshCapacity.initial = 2 * clips.bytes().size();
   std::uint64_t joints = 0, outputBytes = 0;
   for (const std::uint32_t count : character.jointCounts()) joints += count;
   for (const Part& part : character.parts()) {
@@ -194,7 +197,8 @@ SceneDescription describeScene(const Character& character, const Options& option
   // room for a quarter more.
   const auto withSlack = [](std::uint64_t count) { return count + count / 4 + 64; };
   const std::uint64_t parts = character.parts().size();
-  scene.jointCapacity.initial = withSlack((options.figures + 1) * joints);
+  Capacity& jointCapacity = options.device == "cpu" ? scene.jointCapacity : scene.gpuJointCapacity;
+  jointCapacity.initial = withSlack((options.figures + 1) * joints);
   scene.instanceCapacity.initial = withSlack((options.figures + 1) * parts);
   scene.outputCapacity.initial = withSlack((options.figures + 1) * outputBytes);
   if (options.outputBudget != 0)
@@ -205,12 +209,17 @@ SceneDescription describeScene(const Character& character, const Options& option
 // [crowd-set-up]
 /// Builds pipelines, so call it from a loading thread.
 vulkan::SceneRecorder createOnDevice(const vulkan::Context& context, const Character& character,
-                                     const Options& options, bool measuresGpuTime) {
+                                     const PackedClips& clips, const Options& options,
+                                     bool measuresGpuTime) {
   vulkan::SceneRecorderDescription description;
-  description.scene = describeScene(character, options);
+  description.scene = describeScene(character, clips, options);
   description.measuresGpuTime = measuresGpuTime;
   vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
-  for (const Part& part : character.parts()) must(recorder.prepare(describe(part, options)));
+  for (const Part& part : character.parts()) {
+    PipelineNeeds needs = must(recorder.scene().pipelineNeeds(describe(part, options)));
+    needs.figures = true;
+    must(context.prepare(needs));
+  }
   return recorder;
 }
 // [/crowd-set-up]
@@ -218,11 +227,12 @@ vulkan::SceneRecorder createOnDevice(const vulkan::Context& context, const Chara
 /// The figures of a scene, on a device or on the CPU.
 class Crowd {
  public:
-  Crowd(Scene& scene, const Character& character, const Options& options)
+  Crowd(Scene& scene, const Character& character, const PackedClips& clips, const Options& options)
       : scene_(&scene),
         character_(&character),
         options_(&options),
         world_(character, options.figures),
+        clips_(must(scene.addClips(PackedClips(clips)))),
         figures_(options.figures) {
     for (const Part& part : character.parts())
       meshes_.push_back(must(scene_->addMesh(part.packed)));
@@ -234,6 +244,7 @@ class Crowd {
     for (const Figure& figure : figures_) {
       if (figure.isThere()) move(figure);
     }
+    play();
   }
 
   Scene& scene() { return *scene_; }
@@ -245,18 +256,17 @@ class Crowd {
 
  private:
   // [crowd-add]
-  /// A figure has a pose for each skin, and an instance of each mesh: body, hair, clothes.
+  /// A figure has a pose for each skin of its clips, and an instance of each mesh: body, hair,
+  /// clothes.
   Result<void> add(Figure& figure) {
-    for (const std::uint32_t jointCount : character_->jointCounts()) {
-      const Result<PoseHandle> pose = scene_->addPose(jointCount);
-      if (!pose) return pose.error();
-      figure.poses.push_back(*pose);
-    }
+    const Result<FigureHandle> handle = scene_->addFigure(clips_);
+    if (!handle) return handle.error();
+    figure.handle = *handle;
     for (std::size_t index = 0; index < meshes_.size(); ++index) {
       const Part& part = character_->parts()[index];
       InstanceDescription description = describe(part, *options_);
       description.mesh = meshes_[index];
-      description.pose = figure.poses[part.skin];
+      description.pose = must(scene_->pose(figure.handle, part.skin));
       const Result<InstanceHandle> instance = scene_->addInstance(description);
       if (!instance) return instance.error();
       figure.instances.push_back(*instance);
@@ -269,7 +279,7 @@ class Crowd {
   void remove(Figure& figure) {
     for (const InstanceHandle instance : std::exchange(figure.instances, {}))
       must(scene_->removeInstance(instance));
-    for (const PoseHandle pose : std::exchange(figure.poses, {})) must(scene_->removePose(pose));
+    if (figure.handle) must(scene_->removeFigure(std::exchange(figure.handle, {})));
   }
 
   void comeAndGo(std::uint64_t frame) {
@@ -305,13 +315,18 @@ class Crowd {
       change.teleports = figure.now.teleports;
       must(scene_->change(change));
     }
-    // All instances of a figure are due in the same frames. If the GPU culls, it may skin any
-    // figure.
-    if (!options_->culledOnGpu && !must(scene_->isDue(figure.instances.front()))) return;
-    for (std::uint32_t skin = 0; skin < figure.poses.size(); ++skin) {
-      const std::span<JointMatrix> pose = must(scene_->writePose(figure.poses[skin]));
-      std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
+  }
+
+  /// One call for all figures. The scene samples the poses of those that it skins.
+  void play() {
+    std::vector<std::vector<ClipLayer>> layers;
+    std::vector<FigurePlay> plays;
+    for (const Figure& figure : figures_) {
+      if (!figure.isThere()) continue;
+      layers.push_back(character_->layers(figure.now.pose));
+      plays.push_back({figure.handle, layers.back()});
     }
+    must(scene_->play(plays));
   }
   // [/crowd-move]
 
@@ -319,6 +334,7 @@ class Crowd {
   const Character* character_;
   const Options* options_;
   World world_;
+  ClipsHandle clips_;
   std::vector<MeshHandle> meshes_;  ///< by part
   std::vector<Figure> figures_;
   std::uint64_t refusals_ = 0;
@@ -516,6 +532,19 @@ class Report {
 
 // -- The program: the frame loop, with the check.
 
+ExitStatus reportWrongPoses(const crowd::TickPoses& poses) {
+  return reportError(
+      ExitStatus::verificationFailed,
+      fmt::format("a pose is {:.3g} times its bound away from the clips", poses.worst()));
+}
+
+CharacterCheck checkOf(const Character& character, const crowd::TickPoses& poses) {
+  fmt::print("clips     the poses of all ticks are at most {:.2f} of their bound from the file's\n",
+             poses.worst());
+  return {character, [&poses](PoseKey key, std::uint32_t skin) { return poses.pose(key, skin); },
+          InstanceDescription().method};
+}
+
 /// Tells the check what the system was asked to show.
 void follow(CharacterCheck& check, Crowd& crowd, std::uint64_t frame, bool culledOnGpu) {
   std::vector<AskedInstance> asked;
@@ -580,12 +609,15 @@ glm::mat4 viewOf(const World& world, std::uint64_t frame) {
   return crowd::viewProjection(place - glm::vec3(2 * ahead.x, 0, 2 * ahead.z), ahead);
 }
 
-ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Options& options) {
+ExitStatus playOnDevice(OpenDevice& open, const Character& character, const PackedClips& clips,
+                        const Options& options) {
   Device& device = *open.device;
   const bool hasTimestamps = must(Timestamps::create(device)).has();
-  vulkan::SceneRecorder recorder = createOnDevice(open.context, character, options, hasTimestamps);
-  Crowd crowd(recorder.scene(), character, options);
-  CharacterCheck check(character, InstanceDescription().method);
+  vulkan::SceneRecorder recorder =
+      createOnDevice(open.context, character, clips, options, hasTimestamps);
+  Crowd crowd(recorder.scene(), character, clips, options);
+  const crowd::TickPoses poses(character, clips, open);
+  CharacterCheck check = checkOf(character, poses);
   Report report(character, options, device.info().name, driverVersion(device));
   const std::uint64_t inFlight = options.framesInFlight;
   std::vector<MappedBuffer> visibility(inFlight);
@@ -627,14 +659,17 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Opti
     must(crowd.scene().beginFrame(frame + inFlight, frame));
     report.complete(costOf(recorder));
   }
+  if (poses.worst() > 1) return reportWrongPoses(poses);
   return report.finish(costOf(recorder), crowd.refusals(), check, device.takeValidationMessages());
 }
 
 /// Without Vulkan. All cores skin; the result is there when the jobs are done.
-ExitStatus playOnCpu(const Character& character, const Options& options) {
-  cpu::SceneRunner runner = must(cpu::SceneRunner::create(describeScene(character, options)));
-  Crowd crowd(runner.scene(), character, options);
-  CharacterCheck check(character, InstanceDescription().method);
+ExitStatus playOnCpu(const Character& character, const PackedClips& clips, const Options& options) {
+  cpu::SceneRunner runner =
+      must(cpu::SceneRunner::create(describeScene(character, clips, options)));
+  Crowd crowd(runner.scene(), character, clips, options);
+  const crowd::TickPoses poses(character, clips);
+  CharacterCheck check = checkOf(character, poses);
   Report report(character, options, CpuTarget().name(), "");
   Cost cost;
   for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
@@ -656,6 +691,7 @@ ExitStatus playOnCpu(const Character& character, const Options& options) {
     follow(check, crowd, frame, false);
     if (options.checks(frame)) check.compare(frame, check.shown(crowd.scene()), runner.output());
   }
+  if (poses.worst() > 1) return reportWrongPoses(poses);
   return report.finish(cost, crowd.refusals(), check);
 }
 
@@ -714,13 +750,16 @@ ExitStatus run(int argc, char** argv) {
   if (const Result<void> kept = checkOutputFiles(outputs, inputs); !kept)
     return reportWrongUsage(kept.error().message);
   try {
-    if (options.device == "cpu") return playOnCpu(*character, options);
+    const std::vector<ClipView> views = gltf::clips(character->model());
+    const Result<PackedClips> clips = packClips(character->skeleton(), views);
+    if (!clips) return reportModelError(clips.error());
+    if (options.device == "cpu") return playOnCpu(*character, *clips, options);
     DeviceOptions wanted;
     wanted.device = options.device;
     wanted.validation = options.validates;
     wanted.graphics = !options.picture.empty();
     OpenDevice open = must(openDevice(wanted));
-    return playOnDevice(open, *character, options);
+    return playOnDevice(open, *character, *clips, options);
   } catch (const Failure& failure) {
     return reportDeviceError(failure.error());
   }

@@ -41,7 +41,8 @@ Result<Character> Character::load(const std::filesystem::path& path,
   const Error tooMuch{ErrorCode::limitExceeded,
                       fmt::format("{}: it needs more memory than the limit for a file of this size",
                                   inQuotes(path.filename().string()))};
-  std::vector<std::uint32_t> skins, numbers(model.skins.size(), gltf::none);
+  std::vector<std::uint32_t>& skins = character.skins_;
+  std::vector<std::uint32_t> numbers(model.skins.size(), gltf::none);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     if (primitive.influences.empty()) continue;
@@ -90,6 +91,20 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
       sampled.poses.push_back(gltf::pose(*model_, skin, globals));
   }
   return true;
+}
+
+Skeleton Character::skeleton() const {
+  Skeleton skeleton = gltf::skeleton(*model_);
+  std::vector<SkeletonSkin> used;
+  for (const std::uint32_t skin : skins_) used.push_back(skeleton.skins[skin]);
+  skeleton.skins = std::move(used);
+  return skeleton;
+}
+
+std::vector<ClipLayer> Character::layers(PoseKey key) const {
+  if (model_->clips.empty()) return {};
+  const double duration = model_->clips[key.clip].duration;
+  return {{.clip = key.clip, .time = duration * key.tick / tickCount(key.clip)}};
 }
 
 std::uint64_t Character::vertexCount() const {

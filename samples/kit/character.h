@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/gltf.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
@@ -54,6 +55,11 @@ class Character {
   std::uint32_t tickCount(std::uint32_t clip) const;
   std::span<const JointMatrix> pose(PoseKey key, std::uint32_t skin) const;
 
+  /// Its skeleton, with the skins of `jointCounts`.
+  Skeleton skeleton() const;
+  /// What a figure plays at a moment; nothing if the file has no clips.
+  std::vector<ClipLayer> layers(PoseKey key) const;
+
  private:
   /// A clip, sampled once. Figures at the same tick of a clip have the same pose.
   struct Clip {
@@ -69,6 +75,7 @@ class Character {
   std::unique_ptr<gltf::Model> model_;  ///< parts point into it
   std::vector<Part> parts_;
   std::vector<std::uint32_t> jointCounts_;
+  std::vector<std::uint32_t> skins_;  ///< numbers in the file, as `jointCounts_`
   std::vector<Clip> clips_;
 };
 

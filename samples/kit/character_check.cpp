@@ -71,8 +71,7 @@ const reference::SkinnedMesh& CharacterCheck::expected(std::uint32_t part, PoseK
   }
   std::call_once(kept->once, [&] {
     const Part& source = character_->parts()[part];
-    kept->mesh = must(
-        reference::skin(source.primitive.mesh(), character_->pose(pose, source.skin), method_));
+    kept->mesh = must(reference::skin(source.primitive.mesh(), poses_(pose, source.skin), method_));
   });
   return *kept->mesh;
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -58,10 +59,13 @@ class CharacterCheck {
     double worst = 0;            ///< the largest error ÷ its bound
   };
 
-  /// `character` must outlive it. Instances are skinned by `method`, with previous
-  /// positions.
-  CharacterCheck(const Character& character, Method method)
-      : character_(&character), method_(method) {}
+  /// The joint matrices at a moment, for a skin of the character.
+  using Poses = std::function<std::span<const JointMatrix>(PoseKey, std::uint32_t)>;
+
+  /// `character`, and what `poses` returns, must outlive it. Instances are skinned by `method`,
+  /// with previous positions.
+  CharacterCheck(const Character& character, Poses poses, Method method)
+      : character_(&character), poses_(std::move(poses)), method_(method) {}
 
   /// Call it once for each frame, after it has been recorded or planned, with all instances.
   /// `skinned` is `skinnedInstances` of the scene.
@@ -127,6 +131,7 @@ class CharacterCheck {
                 std::span<const std::byte> bytes);
 
   const Character* character_;
+  Poses poses_;
   Method method_;
   std::uint64_t frame_ = 0;
   std::vector<Followed> followed_;  ///< by the index of the handle

@@ -127,7 +127,7 @@ class ModelSteps {
     model_.emplace(*engine_);
     engine_->begin();
     narrow_ = must(system().addPose(1));
-    clips_ = must(system().addClips(playedClips()));
+    for (ClipsHandle& clips : clips_) clips = must(system().addClips(playedClips()));
   }
 
   Scene& system() { return engine_->scene(); }
@@ -177,17 +177,18 @@ class ModelSteps {
     if (chance(30)) {
       tryToAdd([&] { return system().addClips(playedClips()); },
                [&](ClipsHandle added) { must(system().removeClips(added)); });
-      tryToAdd([&] { return system().addFigure(clips_); },
+      tryToAdd([&] { return system().addFigure(clips_[0]); },
                [&](FigureHandle added) { must(system().removeFigure(added)); });
     }
-    const Result<FigureHandle> figure = system().addFigure(clips_);
+    const std::uint32_t clips = below(clips_.size());
+    const Result<FigureHandle> figure = system().addFigure(clips_[clips]);
     if (!figure) {
       messages_.insert(figure.error().message);
       return;
     }
     for (std::uint32_t skin = 0; skin < playedSkins; ++skin) {
       model_->poses[nextNumber_++] = {must(system().pose(*figure, skin)), poseOfPlay(0, skin),
-                                      *figure, skin};
+                                      *figure, skin, clips};
     }
   }
   void removeFigure(FigureHandle figure) {
@@ -497,7 +498,7 @@ class ModelSteps {
         model_->poses, [](const auto& pose) { return bool{pose.second.figure}; });
     if (found == model_->poses.end()) return;
     const ModelPose pose = found->second;
-    add([&scene, clips = clips_] { return scene.removeClips(clips); });
+    add([&scene, clips = clips_[pose.clips]] { return scene.removeClips(clips); });
     add([&scene, pose] { return scene.pose(pose.figure, playedSkins); });
     add([&scene, pose] { return scene.removePose(pose.handle); });
     add([&scene, pose] { return scene.writePose(pose.handle); });
@@ -641,7 +642,7 @@ class ModelSteps {
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
   PoseHandle narrow_;
-  ClipsHandle clips_;
+  std::array<ClipsHandle, 2> clips_;                            ///< the same twice
   std::map<std::uint32_t, std::vector<JointMatrix>> matrices_;  ///< of poses
   std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;
   std::set<std::string> messages_;  ///< of all errors

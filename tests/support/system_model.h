@@ -31,6 +31,7 @@ struct ModelPose {
   std::uint32_t pose = 0;
   FigureHandle figure = {};  ///< null: somebody writes it
   std::uint32_t skin = 0;    ///< of the figure
+  std::uint32_t clips = 0;   ///< number of its bank
 };
 
 struct ModelInstance {

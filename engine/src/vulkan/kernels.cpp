@@ -52,6 +52,8 @@ static_assert(sizeof(abi::MorphRecord) == abi::MORPH_WORDS * 4 && abi::MORPH_WOR
 static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
               abi::MORPH_BLOCK_WORDS == 4);
 static_assert(sizeof(abi::FigureRecord) == abi::FIGURE_WORDS * 4 && abi::FIGURE_WORDS % 4 == 0);
+static_assert(sizeof(abi::BankRecord) == abi::BANK_WORDS * 4 && abi::BANK_WORDS == 4);
+static_assert(sizeof(abi::BandRecord) == abi::BAND_WORDS * 4 && abi::BAND_WORDS == 4);
 static_assert(sizeof(abi::StepRecord) == abi::STEP_WORDS * 4 && abi::STEP_WORDS == 4);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
 // Public structures have the layout of the records that kernels write and read.

@@ -118,47 +118,58 @@ Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgrou
   return {};
 }
 
-/// One workgroup per figure: a dispatch that samples the nodes, then one for each band of them.
+/// One workgroup per figure: a dispatch that samples the nodes of all, then one for each band of
+/// nodes and pose buffer. These wait for each other, since each reads and writes the transforms.
 Result<void> Encoder::addFigureDispatches() {
   paletteStage_ = 0;
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  std::uint32_t record = 0;  // they begin the tables
-  for (const Work::Figures& figures : work_->figures) {
-    const std::uint32_t first = wordsOf(tables);
-    tables.resize(first + figures.records.size() * abi::FIGURE_WORDS);
-    std::memcpy(&tables[first], figures.records.data(), std::span(figures.records).size_bytes());
-    const abi::SamplePush push{first, 0, figures.bank, figures.clips->nodeCount};
-    if (Result<void> good = addDispatch(figureVariant(Kernel::sample, limits_, tuning_),
-                                        figures.records.size(), push);
-        !good)
-      return good;
-    paletteStage_ =
-        std::max(paletteStage_, static_cast<std::uint32_t>(figures.clips->bandEnds.size()) + 1);
-  }
-  for (std::uint32_t band = 0; band + 1 < paletteStage_; ++band) {
-    record = 0;
-    for (const Work::Figures& figures : work_->figures) {
-      const DeviceClips& clips = *figures.clips;
-      const std::uint32_t first = record;
-      record += static_cast<std::uint32_t>(figures.records.size() * abi::FIGURE_WORDS);
-      if (band >= clips.bandEnds.size()) continue;
-      const std::uint32_t begin = band == 0 ? 0 : clips.bandEnds[band - 1];
-      const abi::ComposePush push{first,
-                                  0,
-                                  figures.bank,
-                                  figures.kernelWords,
-                                  figures.kernelWords + clips.firstStep + begin * abi::STEP_WORDS,
-                                  clips.bandEnds[band] - begin};
-      if (Result<void> good = addDispatch(figureVariant(Kernel::compose, limits_, tuning_),
-                                          figures.records.size(), push);
-          !good)
-        return good;
-      Dispatch& dispatch = dispatches_.back();
-      dispatch.stage = band + 1;
-      dispatch.joints = BufferRole::gpuPoses;
-      dispatch.poseBuffer = figures.poseBuffer;
+  if (work_->banks.empty()) return {};
+  std::size_t bands = 0, count = 0;
+  for (const Work::Bank& bank : work_->banks) bands = std::max(bands, bank.clips->bandEnds.size());
+  std::vector<std::uint32_t>& tables = plan_->tables;  // they begin with these
+  const std::size_t bankWords = abi::BANK_WORDS + bands * abi::BAND_WORDS;
+  tables.resize(work_->banks.size() * bankWords);
+  for (std::size_t i = 0; i < work_->banks.size(); ++i) {
+    const Work::Bank& bank = work_->banks[i];
+    const DeviceClips& clips = *bank.clips;
+    store(tables, i * bankWords, abi::BankRecord{bank.words, clips.nodeCount, bank.deviceWords, 0});
+    std::uint32_t begin = 0;
+    for (std::size_t band = 0; band < clips.bandEnds.size(); ++band) {
+      store(tables, i * bankWords + abi::BANK_WORDS + band * abi::BAND_WORDS,
+            abi::BandRecord{bank.deviceWords + clips.firstStep + begin * abi::STEP_WORDS,
+                            clips.bandEnds[band] - begin, 0, 0});
+      begin = clips.bandEnds[band];
     }
   }
+  const std::uint32_t figures = wordsOf(tables);
+  for (const std::vector<abi::FigureRecord>& records : work_->figures) {
+    for (abi::FigureRecord record : records) {
+      record.bank *= static_cast<std::uint32_t>(bankWords);
+      tables.resize(tables.size() + abi::FIGURE_WORDS);
+      store(tables, tables.size() - abi::FIGURE_WORDS, record);
+    }
+    count += records.size();
+  }
+  if (Result<void> good = addDispatch(figureVariant(Kernel::sample, limits_, tuning_), count,
+                                      abi::SamplePush{figures, 0});
+      !good)
+    return good;
+  for (std::uint32_t band = 0; band < bands; ++band) {
+    std::uint32_t first = figures;
+    for (std::uint32_t buffer = 0; buffer < work_->figures.size(); ++buffer) {
+      const std::size_t here = work_->figures[buffer].size();
+      if (here == 0) continue;
+      if (Result<void> good = addDispatch(figureVariant(Kernel::compose, limits_, tuning_), here,
+                                          abi::ComposePush{first, 0, band});
+          !good)
+        return good;
+      first += static_cast<std::uint32_t>(here) * abi::FIGURE_WORDS;
+      Dispatch& dispatch = dispatches_.back();
+      dispatch.stage = ++paletteStage_;
+      dispatch.joints = BufferRole::gpuPoses;
+      dispatch.poseBuffer = buffer;
+    }
+  }
+  ++paletteStage_;
   return {};
 }
 

@@ -26,7 +26,8 @@ void Work::begin(Groups& groupsInUse) {
       for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
     }
   }
-  figures.clear();
+  banks.clear();
+  for (std::vector<abi::FigureRecord>& records : figures) records.clear();
   poseCount = 0;
   clearedResults.clear();
   instances.clear();
@@ -34,15 +35,19 @@ void Work::begin(Groups& groupsInUse) {
   groups.clear();
 }
 
-void Work::addFigure(const Figures& figure, const abi::FigureRecord& record) {
+void Work::addFigure(std::uint32_t poseBuffer, const Bank& bank, abi::FigureRecord record) {
   // Mostly that of the figure before.
-  auto entry = std::ranges::find_if(figures, [&](const Figures& other) {
-    return other.clips == figure.clips && other.poseBuffer == figure.poseBuffer;
-  });
-  if (entry == figures.end())
-    entry = figures.insert(figures.end(),
-                           {figure.clips, figure.bank, figure.kernelWords, figure.poseBuffer, {}});
-  entry->records.push_back(record);
+  if (banks.empty() || banks.back().clips != bank.clips) {
+    const auto known = std::ranges::find(banks, bank.clips, &Bank::clips);
+    if (known == banks.end()) {
+      banks.push_back(bank);
+    } else {
+      record.bank = static_cast<std::uint32_t>(known - banks.begin());
+    }
+  }
+  if (record.bank == notUsed) record.bank = static_cast<std::uint32_t>(banks.size() - 1);
+  while (figures.size() <= poseBuffer) figures.emplace_back();
+  figures[poseBuffer].push_back(record);
 }
 
 void Work::startGroup(Groups::Entry& entry) {

@@ -62,13 +62,11 @@ struct Work {
     std::array<std::array<std::vector<abi::PaletteRecord>, jointPromiseCount>, paletteFormCount>
         records;
   };
-  /// Figures of one bank whose poses are in one buffer.
-  struct Figures {
+  /// A bank that figures play.
+  struct Bank {
     const DeviceClips* clips;
-    std::uint32_t bank;         ///< word of the mesh buffer
-    std::uint32_t kernelWords;  ///< the same of `DeviceClips::words`
-    std::uint32_t poseBuffer;
-    std::vector<abi::FigureRecord> records;
+    std::uint32_t words;        ///< where it is in the mesh buffer
+    std::uint32_t deviceWords;  ///< the same of `DeviceClips::words`
   };
   struct Instance {
     const PlacedRun* run;
@@ -82,8 +80,11 @@ struct Work {
     Candidate candidate;
   };
 
-  std::vector<Figures> figures;  ///< whose poses are sampled before they are converted
-  std::vector<Poses> poses;      ///< by pose buffer
+  std::vector<Bank> banks;
+  /// Whose poses are sampled before they are converted, by pose buffer. `FigureRecord::bank` is an
+  /// index into `banks`.
+  std::vector<std::vector<abi::FigureRecord>> figures;
+  std::vector<Poses> poses;  ///< by pose buffer
   std::uint32_t poseCount = 0;
   std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
   std::vector<Instance> instances;            ///< in the order in which they were added
@@ -93,8 +94,7 @@ struct Work {
   /// output window each, culled or not.
   std::vector<std::uint32_t> order;
 
-  /// `figure.records` is not read.
-  void addFigure(const Figures& figure, const abi::FigureRecord& record);
+  void addFigure(std::uint32_t poseBuffer, const Bank& bank, abi::FigureRecord record);
   void begin(Groups& groupsInUse);
   bool isEmpty() const { return poseCount == 0 && clearedResults.empty() && instances.empty(); }
 

@@ -168,7 +168,7 @@ void SceneBooks::gatherFigures() {
         .matrices = static_cast<std::uint32_t>(figure.matrices.offset),
         .poses = static_cast<std::uint32_t>(figure.joints.offset) * abi::UNITS_OF_MATRIX,
         .layerCount = figure.layers.count,
-        .reserved = 0,
+        .bank = notUsed,
         .time0 = layers[0].time,
         .layer0 = layers[0].bits,
         .time1 = layers[1].time,
@@ -177,11 +177,9 @@ void SceneBooks::gatherFigures() {
         .layer2 = layers[2].bits,
         .time3 = layers[3].time,
         .layer3 = layers[3].bits};
-    work_.addFigure({&clips.content->device,
-                     static_cast<std::uint32_t>(clips.bytes.offset / 4),
-                     static_cast<std::uint32_t>(clips.deviceOffset() / 4),
-                     figure.buffer,
-                     {}},
+    work_.addFigure(figure.buffer,
+                    {&clips.content->device, static_cast<std::uint32_t>(clips.bytes.offset / 4),
+                     static_cast<std::uint32_t>(clips.deviceOffset() / 4)},
                     record);
   }
 }
