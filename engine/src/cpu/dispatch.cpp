@@ -48,6 +48,11 @@ void dispatchTask(const Task& task, Scratch* scratch) {
   chosen().load(std::memory_order_relaxed)->skin(task, scratch);
 }
 
+void dispatchSampling(const ClipPlan& plan, const PackedLayers& layers, ClipScratch& scratch,
+                      std::span<JointMatrix> poses) {
+  chosen().load(std::memory_order_relaxed)->sample(plan, layers, scratch, poses);
+}
+
 std::vector<std::string_view> targetNames() {
   std::vector<std::string_view> names;
   for (const InstructionSet* const set : instructionSets) {

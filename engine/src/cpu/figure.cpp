@@ -1,27 +1,20 @@
 // Samples the poses of figures.
 #include <atomic>
 #include <cstdint>
-#include <vector>
 
-#include "clips/sample.h"
+#include "cpu/clip_plan.h"
 #include "cpu/task.h"
 #include "cpu/thread_memory.h"
-#include "strict_floating_point.h"
 
 namespace dermis::cpu {
 
 void FigureTask::finish() {
   State found = state.load(std::memory_order_acquire);
   if (found == State::waiting) {
-    std::vector<Affine<float>>& nodes = threadMemory().nodes;
-    nodes.resize(clips->nodeCount());
+    ClipScratch& scratch = threadMemory().clips;
+    scratch.prepare(*plan);
     if (state.compare_exchange_strong(found, State::busy, std::memory_order_acquire)) {
-      sampleNodes(*clips, layers, nodes);
-      std::size_t first = 0;
-      for (std::uint32_t skin = 0; skin < clips->skinCount(); ++skin) {
-        poseSkin(*clips, skin, nodes, matrices.subspan(first, clips->jointCount(skin)));
-        first += clips->jointCount(skin);
-      }
+      dispatchSampling(*plan, layers, scratch, matrices);
       state.store(State::done, std::memory_order_release);
       state.notify_all();
       return;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
+#include "cpu/clip_plan.h"
 #include "cpu/task.h"
 
 #ifndef DERMIS_CPU_ONLY_SSE4
@@ -24,6 +26,8 @@ namespace dermis::cpu {
 struct InstructionSet {
   std::int64_t target;                               ///< Highway's bit
   void (*skin)(const Task& task, Scratch* scratch);  ///< see `dispatchTask`
+  void (*sample)(const ClipPlan& plan, const PackedLayers& layers, ClipScratch& scratch,
+                 std::span<JointMatrix> poses);  ///< see `dispatchSampling`
 };
 
 extern const InstructionSet avx3, avx2, sse4;

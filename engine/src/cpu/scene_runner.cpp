@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "abi.h"
+#include "cpu/clip_plan.h"
 #include "cpu/task.h"
 #include "plan/check.h"
 #include "plan/work.h"
@@ -76,7 +77,8 @@ struct SceneRunner::State {
   bool isPlanned = false;  ///< the jobs of the frame were made
 
   std::unordered_map<std::uint64_t, Mesh> meshes;  ///< by their offset in a mesh buffer
-  std::span<std::byte> lent;                       ///< the engine's memory for the output
+  std::unordered_map<const PackedClips*, ClipPlan> plans;
+  std::span<std::byte> lent;  ///< the engine's memory for the output
   struct Memory {
     std::vector<CacheLine> lines;
     std::size_t size = 0;  ///< bytes
@@ -159,6 +161,12 @@ Result<SceneRunner> SceneRunner::create(const SceneDescription& description,
   owner.meshRemoved = [](void* user, std::uint64_t offset) {
     static_cast<State*>(user)->meshes.erase(offset);
   };
+  owner.clipsAdded = [](void* user, const PackedClips& clips) {
+    static_cast<State*>(user)->plans.emplace(&clips, ClipPlan(clips));
+  };
+  owner.clipsRemoved = [](void* user, const PackedClips& clips) {
+    static_cast<State*>(user)->plans.erase(&clips);
+  };
   Result<std::unique_ptr<Scene>> scene = SceneAccess::create(setup, owner);
   if (!scene) return scene.error();
   state.scene = std::move(*scene);
@@ -220,7 +228,7 @@ void SceneRunner::State::placeFigures() {
   for (std::size_t place = 0; place < sampling.size(); ++place) {
     const SceneFigure& figure = books().figures_.at(sampling[place]);
     FigureTask& task = figures[place];
-    task.clips = &books().clips_.at(figure.clips.index).content->bank;
+    task.plan = &plans.at(&books().clips_.at(figure.clips.index).content->bank);
     task.layers = figure.layers;
     task.matrices = books().matricesOf(figure);
     task.state.store(FigureTask::State::waiting, std::memory_order_relaxed);

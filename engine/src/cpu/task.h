@@ -30,11 +30,13 @@ struct Scratch {
   std::vector<CacheLine> tile;             ///< what the stages hand to each other
 };
 
+struct ClipPlan;
+
 /// A figure, whose poses are sampled by the first task that needs one of them.
 struct FigureTask {
   enum class State : std::uint32_t { waiting, busy, done };
 
-  const PackedClips* clips = nullptr;
+  const ClipPlan* plan = nullptr;
   PackedLayers layers;
   std::span<JointMatrix> matrices;  ///< of all skins
   std::atomic<State> state = State::waiting;

@@ -46,6 +46,9 @@ struct SceneOwner {
   /// Takes the bytes of a mesh. If null, the plan uploads them.
   Result<void> (*meshAdded)(void* user, std::uint64_t offset, const PackedMesh& mesh) = nullptr;
   void (*meshRemoved)(void* user, std::uint64_t offset) = nullptr;  ///< optional
+  /// A bank was added, whose address stays the same until it is removed. Optional.
+  void (*clipsAdded)(void* user, const PackedClips& clips) = nullptr;
+  void (*clipsRemoved)(void* user, const PackedClips& clips) = nullptr;  ///< optional
 };
 
 DERMIS_CORE_API Result<void> checkSetup(const SceneSetup& setup);

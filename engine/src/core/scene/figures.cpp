@@ -31,6 +31,8 @@ Result<ClipsHandle> Scene::addClips(PackedClips clips) {
   const ClipsHandle handle =
       books.clips_.add({std::make_unique<const SceneClips::Content>(std::move(content)), bytes, 0});
   if (!books.owner_.isCpu) books.clipUploads_.push_back(handle);
+  if (books.owner_.clipsAdded != nullptr)
+    books.owner_.clipsAdded(books.owner_.user, books.clips_.at(handle.index).content->bank);
   return handle;
 }
 
@@ -40,6 +42,8 @@ Result<void> Scene::removeClips(ClipsHandle handle) {
   if (clips == nullptr) return unknownHandle("clips", handle);
   if (clips->users != 0) return isUsed("clips", handle.index, clips->users, "figure");
   if (!books.owner_.isCpu) books.retire(books.meshStore_.ranges, clips->bytes);
+  if (books.owner_.clipsRemoved != nullptr)
+    books.owner_.clipsRemoved(books.owner_.user, clips->content->bank);
   books.clips_.remove(handle);
   return {};
 }
