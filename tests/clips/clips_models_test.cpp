@@ -1,5 +1,5 @@
 // All models with skins and clips: poses of their banks, and of those of their variants, are as
-// near to the clips as the bank says.
+// near to the clips as the bank says. Every instruction set samples the same bits.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,17 +8,22 @@
 #include <filesystem>
 #include <functional>
 #include <random>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "clip_rig.h"
 #include "clip_variants.h"
 #include "clips/sample.h"
+#include "cpu/clip_plan.h"
+#include "dermis/cpu.h"
 #include "exhaustive.h"
 #include "gltf_builder.h"
 #include "model_files.h"
 #include "random_number.h"
+#include "scene_meshes.h"
 #include "test_data.h"
 #include "test_paths.h"
 
@@ -79,9 +84,39 @@ bool hasInexactKeys(const PackedRig& rig) {
   });
 }
 
+/// Samples with each instruction set.
+class CpuPoses {
+ public:
+  explicit CpuPoses(const PackedClips& bank) : bank_(bank), plan_(bank) { scratch_.prepare(plan_); }
+  ~CpuPoses() { must(cpu::setTarget({})); }
+
+  /// Whether the poses are the bits of `samplePose`.
+  void check(std::span<const ClipLayer> layers) {
+    std::vector<JointMatrix> expected, pose;
+    for (std::uint32_t skin = 0; skin < bank_.skinCount(); ++skin) {
+      pose.resize(bank_.jointCount(skin));
+      must(samplePose(bank_, layers, skin, pose));
+      expected.insert(expected.end(), pose.begin(), pose.end());
+    }
+    const PackedLayers packed = must(packLayers(bank_, layers, ""));
+    for (const std::string_view target : cpu::targetNames()) {
+      must(cpu::setTarget(target));
+      std::vector<JointMatrix> poses(expected.size());
+      cpu::dispatchSampling(plan_, packed, scratch_, poses);
+      ASSERT_TRUE(areSame(poses, expected)) << target;
+    }
+  }
+
+ private:
+  const PackedClips& bank_;
+  cpu::ClipPlan plan_;
+  cpu::ClipScratch scratch_;
+};
+
 /// Each clip alone. Returns the largest error divided by its bound.
 double checkEachClip(const PackedRig& rig, std::mt19937& random) {
   double worst = 0;
+  CpuPoses cpu(*rig.bank);
   for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
     SCOPED_TRACE("clip " + std::to_string(clip));
     for (const double time : timesOf(rig.clips[clip], random)) {
@@ -89,6 +124,7 @@ double checkEachClip(const PackedRig& rig, std::mt19937& random) {
       const bool isInside = time >= 0 && time < rig.clips[clip].duration;
       for (const bool hold : {false, true}) {
         const ClipLayer layer{.clip = clip, .time = time, .hold = hold};
+        cpu.check({&layer, 1});
         if ((hold && isInside) || rig.isNearJump(layer)) continue;
         worst = std::max(worst, rig.check(layer));
       }
@@ -114,6 +150,7 @@ void checkLayers(PackedRig& rig, std::mt19937& random) {
                                                        : between(random, 0, 1));
   }
   if (!rig.pack()) return;
+  CpuPoses cpu(*rig.bank);
   for (std::uint32_t i = 0; i < layersPerModel; ++i) {
     const std::vector<ClipLayer> layers = randomLayers(rig, random);
     std::string text;
@@ -122,6 +159,7 @@ void checkLayers(PackedRig& rig, std::mt19937& random) {
               std::to_string(layer.weight) + ", mask " + std::to_string(layer.mask) + ")";
     }
     SCOPED_TRACE("layers" + text);
+    cpu.check(layers);
     rig.check(layers);
     if (::testing::Test::HasFailure()) return;
   }
