@@ -96,7 +96,7 @@ PlanClip planClip(const ClipBank& bank, const BankClip& clip, const PlanLocals& 
                               (std::size_t{keys.columnCount} + 3) / 4 * 4});
         }
         to.tracks.push_back(
-            {end - 8, number, static_cast<std::uint32_t>(place), keys.ranges + 6 * column});
+            {end - 8, number, static_cast<std::uint32_t>(place), keys.ranges + 8 * column});
         break;
       }
     }

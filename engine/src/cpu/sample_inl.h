@@ -233,18 +233,17 @@ inline HWY_ATTR void sampleVectors(const KeyBatch& batch, std::size_t apart) {
   for (std::size_t i = 0; i < batch.count; i += wideLanes) {
     const Vec3<Wide> from = integersOf<size, false>(loadKeys(batch.from.data() + i));
     const Vec3<Wide> to = integersOf<size, false>(loadKeys(batch.to.data() + i));
-    // Three minima and three steps.
-    const Vec4<Wide> low = gatherRows(d, batch.ranges.data() + i, 0);
-    const Vec4<Wide> high = gatherRows(d, batch.ranges.data() + i, 2);
+    const Vec4<Wide> least = gatherRows(d, batch.ranges.data() + i, 0);
+    const Vec4<Wide> steps = gatherRows(d, batch.ranges.data() + i, 4);
     const auto fraction = hn::LoadU(d, batch.fractions.data() + i);
     const auto share = hn::Sub(hn::Set(d, 1.0f), fraction);
-    const auto between = [&](Vec<Wide> a, Vec<Wide> b, Vec<Wide> least, Vec<Wide> step) HWY_ATTR {
-      return mix<Wide>(hn::Add(least, hn::Mul(a, step)), share, hn::Add(least, hn::Mul(b, step)),
+    const auto between = [&](Vec<Wide> a, Vec<Wide> b, Vec<Wide> low, Vec<Wide> step) HWY_ATTR {
+      return mix<Wide>(hn::Add(low, hn::Mul(a, step)), share, hn::Add(low, hn::Mul(b, step)),
                        fraction);
     };
-    hn::Store(between(from.x, to.x, low.x, low.w), d, results[0]);
-    hn::Store(between(from.y, to.y, low.y, high.z), d, results[1]);
-    hn::Store(between(from.z, to.z, low.z, high.w), d, results[2]);
+    hn::Store(between(from.x, to.x, least.x, steps.x), d, results[0]);
+    hn::Store(between(from.y, to.y, least.y, steps.y), d, results[1]);
+    hn::Store(between(from.z, to.z, least.z, steps.z), d, results[2]);
     for (std::size_t lane = 0; lane < std::min(wideLanes, batch.count - i); ++lane) {
       float* const place = batch.places[i + lane];
       place[0] = results[0][lane];
