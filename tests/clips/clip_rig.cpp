@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <iterator>
 #include <utility>
 
@@ -13,9 +14,13 @@
 #include <glm/vec4.hpp>
 
 #include "dermis/verify.h"
+#include "gltf_builder.h"
 #include "matrix_of.h"
+#include "model_files.h"
 #include "random_number.h"
 #include "scene_meshes.h"
+#include "test_data.h"
+#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -260,6 +265,26 @@ std::vector<ClipLayer> randomLayers(const PackedRig& rig, std::mt19937& random) 
     if (rig.isNearJump(layer)) layer.time = 0;
   }
   return layers;
+}
+
+void forEachAnimatedModel(std::uint32_t maxClips,
+                          const std::function<void(gltf::Model, std::uint32_t)>& call) {
+  std::vector<std::filesystem::path> files;
+  for (const char* name : {"arm.glb", "bar.glb", "figure.glb"})
+    files.push_back(std::filesystem::path(sampleModels) / name);
+  if (const auto data = testDataFolder()) {
+    const std::vector<std::filesystem::path> more = modelFiles(*data);
+    files.insert(files.end(), more.begin(), more.end());
+  }
+  std::uint32_t number = 0;
+  for (const std::filesystem::path& file : files) {
+    SCOPED_TRACE(file.string());
+    gltf::Model model = loaded(gltf::load(file));
+    if (model.skins.empty() || model.clips.empty()) continue;
+    if (model.clips.size() > maxClips) model.clips.resize(maxClips);
+    call(std::move(model), number++);
+  }
+  EXPECT_GE(number, testDataFolder() ? 20u : 3u);
 }
 
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {

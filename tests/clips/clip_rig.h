@@ -95,6 +95,11 @@ class PackedRig {
 /// must have clips.
 std::vector<ClipLayer> randomLayers(const PackedRig& rig, std::mt19937& random);
 
+/// Calls with each model that has skins and clips, and its number: those of the samples, and of the
+/// test data if there are any. At most `maxClips` of its clips are kept.
+void forEachAnimatedModel(std::uint32_t maxClips,
+                          const std::function<void(gltf::Model, std::uint32_t)>& call);
+
 /// Whether two poses are the same bits.
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b);
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <functional>
 #include <random>
 #include <span>
@@ -20,12 +19,9 @@
 #include "cpu/clip_plan.h"
 #include "dermis/cpu.h"
 #include "exhaustive.h"
-#include "gltf_builder.h"
-#include "model_files.h"
 #include "random_number.h"
 #include "scene_meshes.h"
 #include "test_data.h"
-#include "test_paths.h"
 
 namespace dermis::test {
 namespace {
@@ -34,29 +30,9 @@ constexpr std::uint32_t maxClipsOfModel = isExhaustive ? 1000 : 3;
 constexpr std::uint32_t timesPerClip = isExhaustive ? 400 : 12;
 constexpr std::uint32_t layersPerModel = isExhaustive ? 400 : 12;
 
-/// Models that have skins and clips: those of the samples, and of the test data if there are any.
-std::vector<std::filesystem::path> animatedFiles() {
-  std::vector<std::filesystem::path> files;
-  for (const char* name : {"arm.glb", "bar.glb", "figure.glb"})
-    files.push_back(std::filesystem::path(sampleModels) / name);
-  const auto data = testDataFolder();
-  if (!data) return files;
-  const std::vector<std::filesystem::path> more = modelFiles(*data);
-  files.insert(files.end(), more.begin(), more.end());
-  return files;
-}
-
 /// Calls with each model, and its number. At most `maxClipsOfModel` of its clips are kept.
 void forEachModel(const std::function<void(gltf::Model, std::uint32_t)>& call) {
-  std::uint32_t number = 0;
-  for (const std::filesystem::path& file : animatedFiles()) {
-    SCOPED_TRACE(file.string());
-    gltf::Model model = loaded(gltf::load(file));
-    if (model.skins.empty() || model.clips.empty()) continue;
-    if (model.clips.size() > maxClipsOfModel) model.clips.resize(maxClipsOfModel);
-    call(std::move(model), number++);
-  }
-  EXPECT_GE(number, testDataFolder() ? 20u : 3u);
+  forEachAnimatedModel(maxClipsOfModel, call);
 }
 
 /// Times at which much may go wrong: at keys, as near to them as possible, at the ends, and beyond.

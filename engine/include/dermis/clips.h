@@ -229,4 +229,39 @@ DERMIS_CORE_API float clipTime(const ClipInfo& clip, double seconds, bool hold =
 DERMIS_CORE_API Result<void> samplePose(const PackedClips& bank, std::span<const ClipLayer> layers,
                                         std::uint32_t skin, std::span<JointMatrix> pose);
 
+// ---- Boxes for culling, computed once, for a mesh that clips move. docs/bounds.md has the proof.
+
+/// A box that contains every position that `skinnedBounds` would find for a mesh, in every pose
+/// that `samplePose` makes of one clip alone: at any time, without a mask, and with a weight that
+/// is above 0 as float16. If the clip is additive, it is added to the rest pose with the weight 1.
+///
+/// `mesh` is what `jointBounds` returned for a mesh of this skin; method and promise are those of
+/// `skinnedBounds`. The box is in the space of the pose. It is infinite if that of `skinnedBounds`
+/// is, thus for methods without a proof.
+///
+/// The time of the clip is split until the box is on no side more than 1/100 of its longest side
+/// larger than what `skinnedBounds` finds at single times, or until there are 4 pieces for each of
+/// the clip's finest intervals, but at least 256 and at most 4,096.
+/// O(pieces × (nodes + keys of a piece + pairs × depth + trios × depth)). Any thread.
+///
+/// Fails with `invalidArgument` if the clip or the skin does not exist, or if the mesh requires
+/// more joints than the skin has.
+DERMIS_CORE_API Result<Box> clipBounds(const PackedClips& bank, std::uint32_t clip,
+                                       std::uint32_t skin, const JointBounds& mesh, Method method,
+                                       JointPromise promise = JointPromise::scaling);
+
+/// A box that contains every position of a mesh in every pose that `samplePose` makes of these
+/// clips: of any layers of them, with any times, weights and masks. The rest pose is one of them.
+///
+/// Each node may have any mean of what the clips and the rest pose give it. If its rotations are
+/// more than 90° from their middle, it may have any rotation: the mesh below is in a ball. So the
+/// box is larger than that of all clips played alone, and much larger if they turn a node far.
+///
+/// Arguments, and the infinite box, as for `clipBounds`. O(keys + nodes + pairs × depth). Any
+/// thread. Fails with `invalidArgument` as `clipBounds` does, and if a clip is additive.
+DERMIS_CORE_API Result<Box> blendBounds(const PackedClips& bank,
+                                        std::span<const std::uint32_t> clips, std::uint32_t skin,
+                                        const JointBounds& mesh, Method method,
+                                        JointPromise promise = JointPromise::scaling);
+
 }  // namespace dermis

@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory_resource>
+#include <numbers>
 #include <span>
 #include <vector>
 
 #include "bounds/extent.h"
+#include "bounds/joint_regions.h"
 #include "dermis/mesh.h"
 #include "strict_floating_point.h"
 
@@ -167,21 +169,50 @@ namespace dermis {
 namespace {
 
 using bounds::Affine;
+using bounds::Chord;
+using bounds::JointRegion;
+using bounds::JointRegions;
 using bounds::Parts;
 using bounds::Range;
+
+/// What is not known of a joint of a region.
+struct Uncertainty {
+  const JointRegion* region = nullptr;
+  std::uint32_t joint = 0;  ///< index into the pose
+  /// |v − map p| is at most what the region says, with this instead of its `slack`.
+  double slack = 0;
+  double angle = 0, stretch = 0;  ///< how far R and S may be from those of `parts`
+};
 
 /// A joint in the pose: v = C p, and for dual quaternions C = R S.
 struct Posed {
   Affine map;
   Parts parts;
+  const Uncertainty* uncertainty = nullptr;  ///< null: the matrix is exactly known
   /// The two smallest |q · q'| with joints that share vertices of more than `maxTrioInfluences`
   /// influences.
   double leastCosines[2] = {1, 1};
-  /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
-  bool split = false;
   double partnerDistance = 0;  ///< largest |t − t'| of a joint that shares vertices, and the most
   std::uint32_t influences = 0;  ///< influences of such a vertex; only where a joint is ambiguous
+  /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
+  bool split = false;
 };
+static_assert(sizeof(Posed) == 256, "`skinnedBounds` needs 32 KiB of stack");
+
+/// How far v may be from map p, for the points of an extent.
+double errorOf(const Posed& joint, const Extent& extent) {
+  if (joint.uncertainty == nullptr) return 0;
+  const JointRegion& region = *joint.uncertainty->region;
+  return region.shift + region.turn * bounds::reachOf(bounds::imageOf(region.bind, extent)) +
+         joint.uncertainty->slack * bounds::reachOf(bounds::rangeOf(extent));
+}
+
+/// How far t may be from that of the map.
+double offsetError(const Posed& joint) {
+  if (joint.uncertainty == nullptr) return 0;
+  const JointRegion& region = *joint.uncertainty->region;
+  return region.shift + region.turn * math::length(region.bind.offset);
+}
 
 Affine affineOf(const JointMatrix& matrix) {
   Affine map;
@@ -217,6 +248,16 @@ Turn turnBetween(const Posed& first, const Posed& second) {
 /// Below this cosine rounding decides the sign.
 constexpr double ambiguousCosine = 2e-5;
 
+/// Whether sums and products of a region's numbers stay finite.
+bool isBounded(const JointRegion& region) {
+  double sum = region.shift + region.turn + region.slack + region.spread + region.most;
+  for (const Affine* map : {&region.map, &region.bind}) {
+    for (int axis = 0; axis < 3; ++axis) sum += math::length(map->linear[axis]);
+    sum += math::length(map->offset);
+  }
+  return sum < 1e75;
+}
+
 /// What `skinnedBounds` was asked for.
 struct Blend {
   Method method;
@@ -228,8 +269,11 @@ struct Blend {
 
 class PoseBounds {
  public:
-  PoseBounds(const JointBoundsData& bounds, const Blend& blend, std::pmr::memory_resource* memory)
+  /// `regions`: null if a pose is exactly known.
+  PoseBounds(const JointBoundsData& bounds, const Blend& blend, const JointRegions* regions,
+             std::pmr::memory_resource* memory)
       : bounds_(bounds),
+        regions_(regions),
         method_(blend.method),
         exactJoints_(!blend.decomposed),
         ignoresScale_(blend.decomposed && !blend.mayScale),
@@ -259,9 +303,14 @@ class PoseBounds {
   /// so large that float32 cannot hold the sums of an extent: from here on no number is NaN.
   bool pose(std::span<const JointMatrix> palette) {
     joints_.reserve(bounds_.joints.size());
+    if (regions_ != nullptr) uncertainties_.reserve(bounds_.joints.size());
     for (const JointBoundsData::Joint& used : bounds_.joints) {
-      if (used.joint >= palette.size() || !isFinite(palette[used.joint])) return false;
       Posed& joint = joints_.emplace_back();
+      if (regions_ != nullptr) {
+        if (!poseRegion(joint, used.joint)) return false;
+        continue;
+      }
+      if (used.joint >= palette.size() || !isFinite(palette[used.joint])) return false;
       joint.map = affineOf(palette[used.joint]);
       if (method_ == Method::dualQuaternion || ignoresScale_) {
         joint.parts = bounds::partsOf(joint.map.linear);
@@ -285,6 +334,77 @@ class PoseBounds {
     return bind_.empty() || bounds::reachOf(bind_) <= 1e38;
   }
 
+  /// False if the joint is outside the pose, or its numbers are too large.
+  bool poseRegion(Posed& joint, std::uint32_t index) {
+    if (index >= regions_->joints.size() || !isBounded(regions_->joints[index])) return false;
+    const JointRegion& region = regions_->joints[index];
+    Uncertainty& uncertainty = uncertainties_.emplace_back();
+    uncertainty.region = &region;
+    uncertainty.joint = index;
+    uncertainty.slack = region.slack;
+    joint.uncertainty = &uncertainty;
+    joint.map = region.map;
+    largest_ = std::max({largest_, region.most, 1 + 1e-5});
+    furthest_ = std::max(furthest_, math::length(joint.map.offset) + offsetError(joint));
+    if (method_ == Method::dualQuaternion || ignoresScale_) decompose(joint, uncertainty);
+    anyAmbiguous_ |= joint.parts.ambiguous;
+    return true;
+  }
+
+  /// R and S of all matrices of a region. If it does not say what R is, it is near that of the
+  /// center: ‖R − R'‖ ≤ 2 ‖C − C'‖ / (σ₃ + σ'₃), with Frobenius norms; Li 1995, "New perturbation
+  /// bounds for the unitary polar factor". All matrices are far from those whose R is a matter of
+  /// rounding if their smallest singular value is at least 1/40 of the largest.
+  void decompose(Posed& joint, Uncertainty& uncertainty) const {
+    const JointRegion& region = *uncertainty.region;
+    Parts& parts = joint.parts;
+    const double tiny = std::max(0.05 * region.most, 0x1p-80);
+    const double scale = std::max(region.most - 1, 1 - region.least);  // ‖S − 1‖
+    const bool isUpright = region.least >= tiny;
+    // σ₁ σ₂ σ₃ ≤ σ₁² σ₃
+    const double smallest =
+        std::abs(math::determinant(joint.map.linear)) / (region.most * region.most);
+    const bool isNear = smallest >= tiny && 2 * region.spread < smallest;
+    if (isUpright &&
+        (!isNear || (region.angle < std::numbers::pi && (!ignoresScale_ || scale < 1e-3)))) {
+      const double middle = 0.5 * (region.least + region.most);
+      parts.real = region.rotation;
+      parts.scaleShear = middle * math::Mat3{};
+      parts.rigid = false;
+      uncertainty.angle = std::min(region.angle, std::numbers::pi);
+      uncertainty.stretch = region.most - middle;
+      if (ignoresScale_) uncertainty.slack += scale;  // R p = C p + R (1 − S) p
+    } else if (isNear) {
+      parts = bounds::partsOf(joint.map.linear);
+      const double turn =
+          2 * std::sqrt(3) * region.spread / (2 * smallest - region.spread);  // ‖R − R'‖
+      uncertainty.angle = 2 * std::asin(std::min(1.0, turn / std::sqrt(8)));
+      uncertainty.stretch = region.spread + turn * region.most;
+      if (isUpright)
+        uncertainty.stretch = std::min(uncertainty.stretch, region.most - region.least);
+      if (ignoresScale_) {
+        const math::Mat3 stretch = parts.scaleShear - math::Mat3{};
+        uncertainty.slack +=
+            uncertainty.stretch +
+            turn * std::sqrt(math::dot(stretch[0], stretch[0]) + math::dot(stretch[1], stretch[1]) +
+                             math::dot(stretch[2], stretch[2]));
+        joint.map.linear = math::rotationOf(parts.real);
+      }
+    } else {
+      parts.ambiguous = true;
+    }
+    if (!ignoresScale_) return;
+    parts = bounds::partsOfRotation(parts);
+    uncertainty.stretch = 0;
+  }
+
+  /// How far the quaternion between two joints may be from that of the centers.
+  double turnError(const Posed& first, const Posed& second) const {
+    if (regions_ == nullptr) return 0;
+    const Uncertainty &a = *first.uncertainty, &b = *second.uncertainty;
+    return 0.5 * std::min(a.angle + b.angle, regions_->angle(a.joint, b.joint));
+  }
+
   /// Finds the joints whose vertices may have influences in opposite hemispheres: by trios or, if a
   /// vertex has too many influences for those, by angles. The angles may name joints that have no
   /// such vertices.
@@ -295,7 +415,8 @@ class PoseBounds {
     for (const JointBoundsData::Pair& pair : bounds_.pairs) {
       if (pair.influences <= JointBoundsData::maxTrioInfluences) continue;
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
-      const double cosine = std::abs(math::dot(first.parts.real, second.parts.real));
+      const double cosine = std::max(
+          0.0, std::abs(math::dot(first.parts.real, second.parts.real)) - turnError(first, second));
       for (Posed* joint : {&first, &second}) {
         auto& [least, next] = joint->leastCosines;
         next = std::min(next, std::max(least, cosine));
@@ -309,11 +430,12 @@ class PoseBounds {
   }
 
   /// Whether no choice of signs brings three quaternions into one hemisphere, all of them.
-  static void splitIfTorn(Posed& a, Posed& b, Posed& c) {
+  void splitIfTorn(Posed& a, Posed& b, Posed& c) const {
     const double ab = math::dot(a.parts.real, b.parts.real);
     const double bc = math::dot(b.parts.real, c.parts.real);
     const double ca = math::dot(c.parts.real, a.parts.real);
-    const double least = std::min({std::abs(ab), std::abs(bc), std::abs(ca)});
+    const double least = std::min({std::abs(ab) - turnError(a, b), std::abs(bc) - turnError(b, c),
+                                   std::abs(ca) - turnError(c, a)});
     if (ab * bc * ca > 0 && least > ambiguousCosine) return;
     a.split = b.split = c.split = true;
   }
@@ -324,7 +446,8 @@ class PoseBounds {
     if (!anyAmbiguous_) return;
     for (const JointBoundsData::Pair& pair : bounds_.pairs) {
       Posed &first = joints_[pair.first], &second = joints_[pair.second];
-      const double distance = math::length(first.map.offset - second.map.offset);
+      const double distance = math::length(first.map.offset - second.map.offset) +
+                              offsetError(first) + offsetError(second);
       for (Posed* joint : {&first, &second}) {
         joint->partnerDistance = std::max(joint->partnerDistance, distance);
         joint->influences = std::max(joint->influences, pair.influences);
@@ -336,8 +459,8 @@ class PoseBounds {
       // A vertex of this joint alone is at C p, or at R p if scale is ignored.
       if (joint.influences == 0 && !ignoresScale_) continue;
       const std::uint32_t influences = std::max(joint.influences, 1u);
-      box_.add(Range{joint.map.offset, joint.map.offset}.grownBy(influences *
-                                                                 (reach + joint.partnerDistance)));
+      box_.add(Range{joint.map.offset, joint.map.offset}.grownBy(
+          offsetError(joint) + influences * (reach + joint.partnerDistance)));
       amplification_ = std::max(amplification_, 0.5 * influences);
     }
   }
@@ -345,7 +468,9 @@ class PoseBounds {
   void addJoints() {
     for (std::size_t index = 0; index < joints_.size(); ++index) {
       const Extent& alone = bounds_.joints[index].alone;
-      if (!alone.empty()) box_.add(bounds::imageOf(joints_[index].map, alone));
+      const Posed& joint = joints_[index];
+      if (!alone.empty())
+        box_.add(bounds::imageOf(joint.map, alone).grownBy(errorOf(joint, alone)));
     }
   }
 
@@ -366,8 +491,12 @@ class PoseBounds {
     if (joints_[pair.first].parts.ambiguous || joints_[pair.second].parts.ambiguous) return;
     const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
     const Share share = shareOf(pair, 1);
-    box_.add(bounds::imageOf(second + share.least * difference, pair.extent));
-    box_.add(bounds::imageOf(second + share.greatest * difference, pair.extent));
+    const double firstError = errorOf(joints_[pair.first], pair.extent);
+    const double secondError = errorOf(joints_[pair.second], pair.extent);
+    for (const double part : {share.least, share.greatest}) {
+      box_.add(bounds::imageOf(second + part * difference, pair.extent)
+                   .grownBy(part * firstError + (1 - part) * secondError));
+    }
   }
 
   void addDualQuaternionPair(const JointBoundsData::Pair& pair) {
@@ -377,36 +506,72 @@ class PoseBounds {
     const Affine difference = first.map - second.map;
     const double stretch = stretchBetween(first, second, pair.extent);
 
-    const double bulging = 1 / (static_cast<double>(pair.minSum) + 2 * turn.cosine);
-    const Affine bulge = bulging * bounds::cross(difference, turn.axis);
+    // In a region the cosine may be this small, or as much larger.
+    const double error = turnError(first, second);
+    const double cosine = std::max(0.0, turn.cosine - error);
+    const double bulging = 1 / (static_cast<double>(pair.minSum) + 2 * cosine);
+    const Bulge bulge = bulgeOf(first, second, turn, cosine, pair.extent);
+    const Affine bulged = bulging * bulge.map;
     amplification_ = std::max(amplification_, 2 * bulging);
 
     Range range;
-    const Share share = shareOf(pair, turn.cosine);
-    for (const double part : {share.least, share.greatest}) {
+    const double firstError = errorOf(first, pair.extent);
+    const double secondError = errorOf(second, pair.extent);
+    const Share share = shareOf(pair, cosine), other = shareOf(pair, turn.cosine + error);
+    for (const double part :
+         {std::min(share.least, other.least), std::max(share.greatest, other.greatest)}) {
       const Affine chord = second.map + part * difference;
-      range.add(bounds::imageOf(chord, pair.extent));
-      range.add(bounds::imageOf(chord + bulge, pair.extent));
-      if (turn.cosine < ambiguousCosine) range.add(bounds::imageOf(chord - bulge, pair.extent));
+      const double chordError = part * firstError + (1 - part) * secondError;
+      range.add(bounds::imageOf(chord, pair.extent).grownBy(chordError));
+      range.add(bounds::imageOf(chord + bulged, pair.extent).grownBy(chordError));
+      if (turn.cosine - error < ambiguousCosine)
+        range.add(bounds::imageOf(chord - bulged, pair.extent).grownBy(chordError));
     }
     // |q − q'| = √(2 − 2 q · q')
-    const double stretching = bulging * std::sqrt(std::max(0.0, 2 - 2 * turn.cosine));
-    box_.add(range.grownBy(stretching * stretch));
+    const double stretching = bulging * std::sqrt(std::max(0.0, 2 - 2 * cosine));
+    box_.add(range.grownBy(stretching * stretch + bulging * bulge.error));
 
     if (pair.influences > 2 && (first.split || second.split)) {
-      const double distance = bounds::reachOf(bounds::imageOf(difference, pair.extent));
-      const double radius = ballFactor(pair, turn.cosine) * (distance + 2 * stretch);
+      const double radius = ballFactor(pair, cosine) * (bulge.chord + 2 * stretch);
       for (const Posed* pivot : {&first, &second}) {
-        if (pivot->split) box_.add(bounds::imageOf(pivot->map, pair.extent).grownBy(radius));
+        if (!pivot->split) continue;
+        box_.add(bounds::imageOf(pivot->map, pair.extent)
+                     .grownBy(radius + errorOf(*pivot, pair.extent)));
       }
     }
   }
 
+  /// D = (v − v') × vec (q q'*) is within `error` of `map`, and |v − v'| is at most `chord`.
+  struct Bulge {
+    Affine map;
+    double error = 0, chord = 0;
+  };
+  Bulge bulgeOf(const Posed& first, const Posed& second, const Turn& turn, double cosine,
+                const Extent& extent) const {
+    const Affine difference = first.map - second.map;
+    const double distance = bounds::reachOf(bounds::imageOf(difference, extent));
+    const Affine map = bounds::cross(difference, turn.axis);
+    if (regions_ == nullptr) return {map, 0, distance};
+    const Uncertainty &a = *first.uncertainty, &b = *second.uncertainty;
+    Chord chord = regions_->chord(a.joint, b.joint, extent);
+    if (ignoresScale_) {
+      chord.error += (a.slack + b.slack) * bounds::reachOf(bounds::rangeOf(extent));
+      chord.length = distance + chord.error;
+    }
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    const double error = chord.error * sine + distance * 0.5 * (a.angle + b.angle);
+    if (error < chord.length * sine) return {map, error, chord.length};
+    return {0.0 * map, chord.length * sine, chord.length};
+  }
+
   /// The largest |S p − S' p| of a pair's vertices: how differently two joints scale them.
   static double stretchBetween(const Posed& first, const Posed& second, const Extent& extent) {
-    if (first.parts.rigid && second.parts.rigid) return 0;
+    const double error =
+        first.uncertainty == nullptr ? 0 : first.uncertainty->stretch + second.uncertainty->stretch;
+    if (first.parts.rigid && second.parts.rigid && error == 0) return 0;
     const Affine difference{first.parts.scaleShear - second.parts.scaleShear, {}};
-    return bounds::reachOf(bounds::imageOf(difference, extent));
+    const double most = bounds::reachOf(bounds::imageOf(difference, extent));
+    return error == 0 ? most : most + error * bounds::reachOf(bounds::rangeOf(extent));
   }
 
   double ballFactor(const JointBoundsData::Pair& pair, double cosine) {
@@ -438,9 +603,11 @@ class PoseBounds {
   }
 
   const JointBoundsData& bounds_;
+  const JointRegions* regions_;
   Method method_;
   bool exactJoints_, ignoresScale_;
   std::pmr::vector<Posed> joints_;
+  std::vector<Uncertainty> uncertainties_;  ///< of regions
   Range box_, bind_;
   double furthest_ = 0;  ///< the largest |t|
   double largest_ = 1;   ///< no singular value is larger
@@ -449,35 +616,45 @@ class PoseBounds {
 };
 
 Box boundsBy(const JointBoundsData& bounds, std::span<const JointMatrix> palette,
-             const Blend& blend) {
+             const JointRegions* regions, const Blend& blend) {
   // Room for the joints of nearly all rigs; what does not fit comes from the heap.
   alignas(Posed) std::array<std::byte, 128 * sizeof(Posed)> room;
   std::pmr::monotonic_buffer_resource memory(room.data(), room.size());
-  return PoseBounds(bounds, blend, &memory).of(palette);
+  return PoseBounds(bounds, blend, regions, &memory).of(palette);
+}
+
+Box boundsOf(const JointBounds& jointBounds, std::span<const JointMatrix> palette,
+             const JointRegions* regions, Method method, JointPromise promise) {
+  const bool mayScale = promise == JointPromise::scaling;
+  const JointBoundsData& bounds = JointBoundsData::of(jointBounds);
+  switch (method) {
+    case Method::linear:
+      return boundsBy(bounds, palette, regions, {Method::linear, false, mayScale});
+    case Method::dualQuaternion:
+      return boundsBy(bounds, palette, regions, {Method::dualQuaternion, true, mayScale});
+    case Method::blended: {
+      // Each position lies between one of linear blending and one of dual quaternions.
+      bounds::Range range =
+          bounds::rangeOf(boundsBy(bounds, palette, regions, {Method::linear, true, mayScale}));
+      range.add(bounds::rangeOf(
+          boundsBy(bounds, palette, regions, {Method::dualQuaternion, true, mayScale})));
+      return bounds::boxOf(range);
+    }
+    default:
+      return bounds::boxOf(bounds::everything());
+  }
 }
 
 }  // namespace
 
 Box skinnedBounds(const JointBounds& jointBounds, std::span<const JointMatrix> palette,
                   Method method, JointPromise promise) {
-  const bool mayScale = promise == JointPromise::scaling;
-  const JointBoundsData& bounds = JointBoundsData::of(jointBounds);
-  switch (method) {
-    case Method::linear:
-      return boundsBy(bounds, palette, {Method::linear, false, mayScale});
-    case Method::dualQuaternion:
-      return boundsBy(bounds, palette, {Method::dualQuaternion, true, mayScale});
-    case Method::blended: {
-      // Each position lies between one of linear blending and one of dual quaternions.
-      bounds::Range range =
-          bounds::rangeOf(boundsBy(bounds, palette, {Method::linear, true, mayScale}));
-      range.add(
-          bounds::rangeOf(boundsBy(bounds, palette, {Method::dualQuaternion, true, mayScale})));
-      return bounds::boxOf(range);
-    }
-    default:
-      return bounds::boxOf(bounds::everything());
-  }
+  return boundsOf(jointBounds, palette, nullptr, method, promise);
+}
+
+Box bounds::skinnedBounds(const JointBounds& jointBounds, const JointRegions& regions,
+                          Method method, JointPromise promise) {
+  return boundsOf(jointBounds, {}, &regions, method, promise);
 }
 
 }  // namespace dermis

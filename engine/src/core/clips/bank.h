@@ -183,6 +183,22 @@ struct ClipBank {
   BankClass keyClass(const BankClip& clip, std::size_t i) const {
     return at<BankClass>(clip.classes + i * wordsOf<BankClass>);
   }
+  /// Where a time is among the keys of a track, in intervals.
+  static float positionOf(float time, const BankClip& clip, const BankClass& keys) {
+    return time * clip.rate * (1.0f / static_cast<float>(1u << keys.level));
+  }
+  /// The fraction of an interval, with which its keys are interpolated: if the interval has a jump,
+  /// 0 before that and 1 from then on.
+  float fractionOf(float fraction, const BankClass& keys, std::size_t row,
+                   std::uint32_t column) const {
+    if (keys.jumps == 0) return fraction;
+    const std::size_t rowWords = (keys.columnCount + 3) / 4;
+    const std::uint32_t jump =
+        words[keys.jumps + row * rowWords + column / 4] >> (column % 4 * 8) & 255;
+    if (jump == 0) return fraction;
+    // The jump is at (jump + 1) / 256.
+    return fraction * 256 >= static_cast<float>(jump + 1) ? 1.0f : 0.0f;
+  }
   float number(std::size_t offset) const { return std::bit_cast<float>(words[offset]); }
   /// 1 for mask 0.
   float mask(std::uint32_t mask, std::size_t node) const {

@@ -7,24 +7,10 @@
 
 #include "clips/bank.h"
 #include "clips/sample.h"
+#include "clips/stretch.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
-namespace {
-
-/// Bounds of the singular values of a transform that does not mirror. A low bound of 0 or less: it
-/// may mirror.
-struct Stretch {
-  double low = 1, high = 1;
-
-  Stretch operator*(const Stretch& other) const {
-    if (low <= 0 || other.low <= 0) return {0, high * other.high};
-    return {low * other.low, high * other.high};
-  }
-};
-
-/// By Gershgorin's theorem for the columns c: the eigenvalues of (cᵢ · cⱼ) are at most as far from
-/// cᵢ · cᵢ as Σ |cᵢ · cⱼ|, j ≠ i, for some i.
 Stretch stretchOf(const Affine<float>& a) {
   const auto at = [&a](std::size_t row, std::size_t column) { return double{a[row][column]}; };
   const auto product = [&](std::size_t i, std::size_t j) {
@@ -41,6 +27,8 @@ Stretch stretchOf(const Affine<float>& a) {
                              at(0, 2) * (at(1, 0) * at(2, 1) - at(1, 1) * at(2, 0));
   return {determinant > 0 && low > 0 ? std::sqrt(low) : 0, std::sqrt(high)};
 }
+
+namespace {
 
 /// Of the scale of a node in all clips. Means of scales are between them.
 Stretch scaleOf(const ClipBank& bank, std::size_t number) {

@@ -56,19 +56,11 @@ Float4 sampleKeys(const ClipBank& bank, const Layer& layer, std::uint32_t word) 
   const std::uint32_t column = word & ((1u << trackColumnBits) - 1);
   const BankClass keys = bank.keyClass(layer.clip, word >> trackColumnBits & 255);
   const KeyFormat format = KeyFormat::of(keys.format);
-  const float position =
-      layer.time * layer.clip.rate * (1.0f / static_cast<float>(1u << keys.level));
+  const float position = ClipBank::positionOf(layer.time, layer.clip, keys);
   const float last = static_cast<float>(keys.keyCount - 2);
   const float interval = std::min(std::floor(position), last);
-  float fraction = position - interval;
   const auto row = static_cast<std::size_t>(interval);
-  if (keys.jumps != 0) {
-    const std::size_t rowWords = (keys.columnCount + 3) / 4;
-    const std::uint32_t jump =
-        bank.words[keys.jumps + row * rowWords + column / 4] >> (column % 4 * 8) & 255;
-    // The jump is at (jump + 1) / 256.
-    if (jump != 0) fraction = fraction * 256 >= static_cast<float>(jump + 1) ? 1.0f : 0.0f;
-  }
+  const float fraction = bank.fractionOf(position - interval, keys, row, column);
   const std::size_t half =
       2 * std::size_t{keys.keys} + row * keys.rowHalves + column * format.halves();
   const KeyBits from = readKey(bank.words, half, format);
