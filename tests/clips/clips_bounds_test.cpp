@@ -282,6 +282,27 @@ TEST_P(ClipsBoundsVariants, AreContained) {
 INSTANTIATE_TEST_SUITE_P(All, ClipsBoundsVariants, ::testing::ValuesIn(clipVariants),
                          [](const auto& variant) { return clipVariantName(variant.param); });
 
+/// The hand is far out while the arm still points one way, and back when the arm jumps to another.
+/// If the arm turned gradually, nothing would be as far out.
+TEST(ClipsBounds, ContainWhatIsReachedBeforeAJump) {
+  gltf::Model model = armRig();
+  gltf::Clip clip{"jump", 1, {}};
+  clip.channels = {channel(arm::hand, ChannelPath::translation, {0, 0.25f, 0.5f, 1},
+                           {0, 0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0}),
+                   channel(arm::upper, ChannelPath::rotation, {0, 0.5f, 1},
+                           {0, 0, 0, 1, 0, 0, 0.8f, 0.6f, 0, 0, 0.8f, 0.6f}, Interpolation::step)};
+  model.clips = {std::move(clip)};
+  PackedRig rig(std::move(model));
+  ASSERT_TRUE(rig.pack());
+  std::mt19937 random(1);
+  const gltf::Primitive primitive = scatteredMesh(rig, 0, random);
+  const gltf::PrimitiveView view(primitive);
+  Ratios ratios;
+  checkClips(rig, view.mesh(), 0, Method::linear, 200, random, ratios);
+  ratios.print("jump");
+  EXPECT_LT(ratios.worst, 1.1);
+}
+
 TEST(ClipsBounds, RefuseBadArguments) {
   PackedRig rig(armRig());
   std::mt19937 random(1);

@@ -78,6 +78,7 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
   const bool isRotation = path == ChannelPath::rotation;
   const bool isAdditive = (clip.flags & 2) != 0;
   const auto put = [&](Vec4 v) {
+    if (!std::isfinite(math::dot(v, v))) v = {infinity, infinity, infinity, infinity};
     if (isRotation) {
       v = normalized(v);
       values.push_back(isAdditive ? normalized(product(rest, v)) : v);
@@ -120,12 +121,14 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
   const auto lastRow = static_cast<std::size_t>(std::min(std::floor(to), last));
   for (std::size_t row = firstRow; row <= lastRow; ++row) {
     const Vec4 a = keyAt(row), b = keyAt(row + 1);
-    const double sign = isRotation && math::dot(a, b) < 0 ? -1 : 1;
+    const double cosine = isRotation ? math::dot(a, b) : 1;
     // Between two fractions a track is linear, or jumps from one of the values to the other.
     for (const float fraction : {row == firstRow ? from - static_cast<float>(row) : 0.0f,
                                  row == lastRow ? to - static_cast<float>(row) : 1.0f}) {
       const double f = double{bank.fractionOf(fraction, keys, row, column)};
-      put(mix(a, 1 - f, b, sign * f));
+      // If the keys are 180° apart, rounding decides the way.
+      if (cosine > -1e-5) put(mix(a, 1 - f, b, f));
+      if (cosine < 1e-5) put(mix(a, 1 - f, b, -f));
     }
   }
 }
@@ -201,15 +204,15 @@ LocalRegion regionOf(const Values& values) {
   const Vec3 sizes = math::max(math::abs(scales.min), math::abs(scales.max));
   const double least = std::min({scales.min.x, scales.min.y, scales.min.z});
   const double most = std::max({sizes.x, sizes.y, sizes.z});
-  region.stretch = {(1 - 32 * u) * std::max(least, 0.0), (1 + 32 * u) * most};
+  // The rotation at rest is not normalized: a quaternion of length l turns by 1 + l² (R − 1).
+  const double length = 2 * std::abs(1 - math::dot(values.rest[1], values.rest[1]));
+  region.stretch = {(1 - 32 * u) * std::max(least * (1 - length), 0.0),
+                    (1 + 32 * u) * most * (1 + length)};
   region.center.linear = math::rotationOf(region.rotation);
   for (int axis = 0; axis < 3; ++axis)
     region.center.linear[axis] = scale[axis] * region.center.linear[axis];
-  // The rotation at rest is not normalized: a quaternion of length l turns by 1 + l² (R − 1).
-  const Vec4& rest = values.rest[1];
   const double turn = region.angle < pi ? 2 * std::sin(region.angle / 2) : 2;
-  region.spread = (turn + 2 * std::abs(1 - math::dot(rest, rest))) * most +
-                  std::max({half.x, half.y, half.z}) +
+  region.spread = (turn + length) * most + std::max({half.x, half.y, half.z}) +
                   16 * u * (most + math::length(values.rest[2].xyz()));
   double error = 0;
   for (const Vec4& value : values.of(ChannelPath::scale)) {
