@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -88,6 +89,33 @@ class CpuPoses {
   cpu::ClipPlan plan_;
   cpu::ClipScratch scratch_;
 };
+
+/// The first layer has no weight on one of the nodes, so the second one is the first there. Its
+/// rotation and the third one are more than 180 degrees apart, but neither is from the first one.
+TEST(CpuPoses, RotationsAreInTheHemisphereOfTheFirstLayerWithWeight) {
+  Skeleton skeleton;
+  skeleton.nodes = {{.translation = {0, 1, 0}}, {.parent = 0, .translation = {0, 1, 0}}};
+  constexpr std::array<std::uint32_t, 2> joints{0, 1};
+  const std::array<JointMatrix, 2> inverseBind{};
+  skeleton.skins = {{"skin", joints, inverseBind}};
+  constexpr std::array<float, 1> times{0};
+  constexpr std::array<float, 4> small{0.1f, 0, 0, 1}, left{0, 0, 0.766f, 0.643f},
+      right{0, 0, -0.766f, 0.643f};
+  std::vector<ClipView> clips;
+  for (const std::array<float, 4>* const turn : {&small, &left, &right}) {
+    ClipView& clip = clips.emplace_back();
+    clip.duration = 1;
+    for (std::uint32_t node = 0; node < 2; ++node)
+      clip.channels.push_back(
+          {.node = node, .path = ChannelPath::rotation, .times = times, .values = *turn});
+  }
+  constexpr std::array<float, 2> factors{1, 0};
+  const std::array<std::span<const float>, 1> masks{factors};
+  const PackedClips bank = must(packClips(skeleton, clips, {.masks = masks}));
+  const std::array<ClipLayer, 3> layers{ClipLayer{.clip = 0, .mask = 1}, ClipLayer{.clip = 1},
+                                        ClipLayer{.clip = 2, .weight = 0.5f}};
+  CpuPoses(bank).check(layers);
+}
 
 /// Each clip alone. Returns the largest error divided by its bound.
 double checkEachClip(const PackedRig& rig, std::mt19937& random) {
