@@ -50,7 +50,7 @@ namespace {
 using namespace dermis;
 
 [[noreturn]] void fail(const std::string& what) {
-  std::fprintf(stderr, "dermis_clips_benchmark: error: %s\n", what.c_str());
+  std::fprintf(stderr, "dermis_clips_cpu_benchmark: error: %s\n", what.c_str());
   std::exit(1);
 }
 

@@ -105,8 +105,8 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
   const std::uint32_t column = word & ((1u << trackColumnBits) - 1);
   const BankClass keys = bank.keyClass(clip, word >> trackColumnBits & 255);
   const KeyFormat format = KeyFormat::of(keys.format);
-  std::array<float, 6> range{};
-  if (!isRotation) std::memcpy(range.data(), &bank.words[keys.ranges + 6 * column], sizeof(range));
+  std::array<float, 8> range{};
+  if (!isRotation) std::memcpy(range.data(), &bank.words[keys.ranges + 8 * column], sizeof(range));
   const auto keyAt = [&](std::size_t row) {
     const KeyBits key = readKey(
         bank.words, 2 * std::size_t{keys.keys} + row * keys.rowHalves + column * format.halves(),

@@ -193,7 +193,8 @@ Result<PackedLayers> packLayers(const PackedClips& clips, std::span<const ClipLa
     if (!std::isfinite(layer.weight)) return wrong("its weight is not finite");
     const std::uint32_t weight = toHalf(layer.weight);
     if ((weight & 0x7c00) == 0x7c00) return wrong("its weight is too large for float16");
-    const ClipInfo info = clips.clip(layer.clip);
+    const BankClip clip = bank.clip(layer.clip);
+    const ClipInfo info{clip.duration, (clip.flags & 1) != 0, (clip.flags & 2) != 0};
     if (layer.weight < 0 && weight != 0x8000 && !info.additive)
       return wrong("its weight is negative, and its clip is not additive");
     PackedLayer& place = info.additive ? additive[additives++] : result.layers[result.count++];
@@ -206,14 +207,26 @@ Result<PackedLayers> packLayers(const PackedClips& clips, std::span<const ClipLa
   return result;
 }
 
+namespace {
+
+/// `seconds` modulo `duration`. std::fmod takes longer the more often it wraps.
+double wrapped(double seconds, double duration) {
+  const double turns = std::floor(seconds / duration);
+  if (!(std::abs(turns) < 0x1p52)) {
+    const double rest = std::fmod(seconds, duration);
+    return rest < 0 ? rest + duration : rest;
+  }
+  // The quotient may have been rounded to the next integer. A time just before 0 is the duration.
+  const double rest = std::fma(-turns, duration, seconds);
+  return rest < 0 ? rest + duration : rest > duration ? rest - duration : rest;
+}
+
+}  // namespace
+
 float clipTime(const ClipInfo& info, double seconds, bool hold) {
   const double duration = double{info.duration};
   if (!(duration > 0)) return 0;
-  double time = seconds;
-  if (info.wraps && !hold) {
-    time = std::fmod(seconds, duration);
-    if (time < 0) time += duration;
-  }
+  const double time = info.wraps && !hold ? wrapped(seconds, duration) : seconds;
   return static_cast<float>(std::clamp(time, 0.0, duration));
 }
 
