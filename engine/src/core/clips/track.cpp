@@ -9,10 +9,6 @@ namespace dermis {
 namespace {
 
 constexpr double unitRounding = 0x1p-24;
-/// At which an interval is measured. Between them the error is bounded by an eighth of the square
-/// of their distance, which decides about the size of fast rotations.
-constexpr int points = 32;
-
 double dot(const Value& a, const Value& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
@@ -61,6 +57,8 @@ class Fit {
         duration_(duration),
         interval_(std::ldexp(1, level) / rate),
         tolerance_(tolerance),
+        points_(curve.curvature(0, duration) == 0.0 ? 1
+                                                    : std::max(4, 32 >> std::max(0, -3 - level))),
         jumpTimes_(jumpTimes),
         keyTimes_(keyTimes) {
     const double intervals = std::max(1.0, std::ceil(duration / interval_ - 1e-6));
@@ -93,8 +91,8 @@ class Fit {
               std::min(error, distance(value, curve_.at(time, Side::before), curve_.isRotation()));
         found = std::max(found, error);
       };
-      for (int i = 0; i < points; ++i) {
-        if (const double time = from + i * interval_ / points; time <= to) check(time);
+      for (int i = 0; i < points_; ++i) {
+        if (const double time = from + i * interval_ / points_; time <= to) check(time);
       }
       check(to);
       while (nextKey < keyTimes_.size() && keyTimes_[nextKey] < from) ++nextKey;
@@ -194,11 +192,15 @@ class Fit {
       const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine)), half = (1 + cosine) / 2;
       second += sine * sine / (half * half) + 2 * sine * (1 - cosine) / (half * half);
     }
-    return (curve_.isRotation() ? 2 : 1) * second / (8 * points * points);
+    return (curve_.isRotation() ? 2 : 1) * second / (8 * points_ * points_);
   }
 
   const Curve& curve_;
   double duration_, interval_, tolerance_;
+  /// At which an interval is measured. Between them the error is bounded by an eighth of the square
+  /// of their distance, which decides about the size of fast rotations. Between the keys of
+  /// straight lines it is largest at a key.
+  int points_;
   std::span<const double> jumpTimes_, keyTimes_;
   std::vector<Value> values_;
   std::vector<std::uint8_t> jumps_;
