@@ -659,8 +659,9 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Pack
     must(crowd.scene().beginFrame(frame + inFlight, frame));
     report.complete(costOf(recorder));
   }
-  if (poses.worst() > 1) return reportWrongPoses(poses);
-  return report.finish(costOf(recorder), crowd.refusals(), check, device.takeValidationMessages());
+  const ExitStatus status =
+      report.finish(costOf(recorder), crowd.refusals(), check, device.takeValidationMessages());
+  return poses.worst() > 1 ? reportWrongPoses(poses) : status;
 }
 
 /// Without Vulkan. All cores skin; the result is there when the jobs are done.
@@ -691,8 +692,8 @@ ExitStatus playOnCpu(const Character& character, const PackedClips& clips, const
     follow(check, crowd, frame, false);
     if (options.checks(frame)) check.compare(frame, check.shown(crowd.scene()), runner.output());
   }
-  if (poses.worst() > 1) return reportWrongPoses(poses);
-  return report.finish(cost, crowd.refusals(), check);
+  const ExitStatus status = report.finish(cost, crowd.refusals(), check);
+  return poses.worst() > 1 ? reportWrongPoses(poses) : status;
 }
 
 /// Empty if the program should continue.

@@ -106,6 +106,8 @@ TEST(WrongBytesCommandsTest, TheCrowdsCheckTellsWhichVertexIsWrong) {
   EXPECT_EQ(countOf(result.errors, "instances are wrong; the first: frame 1, "), 1u)
       << result.errors;
   EXPECT_EQ(countOf(result.errors, ": vertex "), 1u) << result.errors;
+  // The poses are read back, too, before the first frame.
+  EXPECT_EQ(countOf(result.errors, " times its bound away from the clips"), 1u) << result.errors;
   EXPECT_EQ(countOf(result.output, "are inside their bounds"), 0u) << result.output;
   EXPECT_GE(nlohmann::json::parse(readText(json)).at("check").at("failures").get<int>(), 1);
   // The layer alone changes nothing.
