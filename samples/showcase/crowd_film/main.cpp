@@ -69,17 +69,19 @@ class SkinnedCrowd {
         character_(&character),
         stroll_(&stroll),
         recorder_(create(context, character, stroll)) {
+    const ClipsHandle clips = must(recorder_.scene().addClips(
+        must(packClips(character.skeleton(), gltf::clips(character.model())))));
     std::vector<MeshHandle> meshes;
     for (const Part& part : character.parts())
       meshes.push_back(must(recorder_.scene().addMesh(part.packed)));
     for (std::uint32_t index = 0; index < stroll.count(); ++index) {
       Figure& figure = figures_.emplace_back();
-      for (const std::uint32_t jointCount : character.jointCounts())
-        figure.poses.push_back(must(recorder_.scene().addPose(jointCount)));
+      figure.handle = must(recorder_.scene().addFigure(clips));
       for (std::size_t part = 0; part < meshes.size(); ++part) {
         InstanceDescription description = describe(character.parts()[part]);
         description.mesh = meshes[part];
-        description.pose = figure.poses[character.parts()[part].skin];
+        description.pose =
+            must(recorder_.scene().pose(figure.handle, character.parts()[part].skin));
         if (index == 0) must(recorder_.prepare(description));
         figure.instances.push_back(must(recorder_.scene().addInstance(description)));
       }
@@ -96,13 +98,13 @@ class SkinnedCrowd {
         visibility.push_back({instance, figure.now.isInView, figure.now.updateInterval});
     }
     must(recorder_.scene().setVisibility(visibility));
+    std::vector<std::vector<ClipLayer>> layers;
+    std::vector<FigurePlay> plays;
     for (const Figure& figure : figures_) {
-      if (!must(recorder_.scene().isDue(figure.instances.front()))) continue;
-      for (std::uint32_t skin = 0; skin < figure.poses.size(); ++skin) {
-        const std::span<JointMatrix> pose = must(recorder_.scene().writePose(figure.poses[skin]));
-        std::ranges::copy(character_->pose(figure.now.pose, skin), pose.begin());
-      }
+      layers.push_back(character_->layers(figure.now.pose));
+      plays.push_back({figure.handle, layers.back()});
     }
+    must(recorder_.scene().play(plays));
     context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::vertexInput, Use::dermis));
     must(recorder_.record(commandBuffer));
     context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput));
@@ -135,7 +137,7 @@ class SkinnedCrowd {
 
  private:
   struct Figure {
-    std::vector<PoseHandle> poses;          ///< by skin
+    FigureHandle handle;
     std::vector<InstanceHandle> instances;  ///< by part
     FigureState now;
   };
@@ -156,7 +158,7 @@ class SkinnedCrowd {
     for (const std::uint32_t count : character.jointCounts()) joints += count;
     for (const Part& part : character.parts())
       outputBytes += must(placeVertices(describe(part).layout, part.packed.vertexCount())).size;
-    description.scene.jointCapacity.initial = stroll.count() * joints;
+    description.scene.gpuJointCapacity.initial = stroll.count() * joints;
     description.scene.outputCapacity.initial = stroll.count() * outputBytes;
     return must(vulkan::SceneRecorder::create(context, description));
   }
