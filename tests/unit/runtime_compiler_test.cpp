@@ -47,12 +47,13 @@ std::vector<fs::path> filesOf(const fs::path& folder) {
   return files;
 }
 
-/// For each source, and each macro, the first module that has it.
+/// For each source, each macro and each layout, the first module that has it.
 std::vector<kernels::Recipe> oneForEach() {
   std::vector<kernels::Recipe> chosen;
   std::set<std::string> seen;
   for (const kernels::Recipe& recipe : kernels::recipes) {
-    std::istringstream words(std::string(recipe.source) + " " + recipe.macros);
+    std::istringstream words(std::string(recipe.source) + " " + recipe.macros +
+                             (recipe.scalarBlockLayout ? " scalar" : ""));
     bool isNew = false;
     for (std::string word; words >> word;) isNew |= seen.insert(word).second;
     if (isNew) chosen.push_back(recipe);
