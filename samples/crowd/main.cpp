@@ -319,14 +319,16 @@ class Crowd {
 
   /// One call for all figures. The scene samples the poses of those that it skins.
   void play() {
-    std::vector<std::vector<ClipLayer>> layers;
-    std::vector<FigurePlay> plays;
+    layers_.clear();
+    plays_.clear();
+    layers_.reserve(figures_.size());  // plays point to them
     for (const Figure& figure : figures_) {
       if (!figure.isThere()) continue;
-      layers.push_back(character_->layers(figure.now.pose));
-      plays.push_back({figure.handle, layers.back()});
+      const auto layer = character_->layer(figure.now.pose);
+      if (layer) layers_.push_back(*layer);
+      plays_.push_back({figure.handle, std::span(layers_).last(layer ? 1 : 0)});
     }
-    must(scene_->play(plays));
+    must(scene_->play(plays_));
   }
   // [/crowd-move]
 
@@ -337,6 +339,8 @@ class Crowd {
   ClipsHandle clips_;
   std::vector<MeshHandle> meshes_;  ///< by part
   std::vector<Figure> figures_;
+  std::vector<ClipLayer> layers_;  ///< of the frame
+  std::vector<FigurePlay> plays_;  ///< of the frame
   std::uint64_t refusals_ = 0;
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <deque>
+#include <optional>
 
 #include <glm/glm.hpp>
 
@@ -28,6 +30,11 @@ glm::dmat4 matrixOf(const Matrix& rows) {
           double{rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]};
   }
   return matrix;
+}
+
+/// A list of one layer, or of none.
+std::span<const ClipLayer> listOf(const std::optional<ClipLayer>& layer) {
+  return layer ? std::span(&*layer, 1) : std::span<const ClipLayer>();
 }
 
 /// Figures, one for each tick of the longest clip, on the device.
@@ -61,13 +68,13 @@ class Sampler {
   std::vector<std::vector<JointMatrix>> poses(std::uint32_t clip) {
     const std::uint32_t ticks = character_->tickCount(clip);
     Scene& scene = recorder_.scene();
-    std::vector<std::vector<ClipLayer>> layers;
+    std::deque<std::optional<ClipLayer>> layers;
     std::vector<FigurePlay> plays;
     std::vector<vulkan::BufferRange> ranges;
     std::uint64_t size = 0;
     for (std::uint32_t tick = 0; tick < ticks; ++tick) {
-      layers.push_back(character_->layers({clip, tick}));
-      plays.push_back({figures_[tick], layers.back()});
+      layers.push_back(character_->layer({clip, tick}));
+      plays.push_back({figures_[tick], listOf(layers.back())});
       for (std::uint32_t skin = 0; skin < character_->jointCounts().size(); ++skin) {
         ranges.push_back(must(recorder_.poseRange(must(scene.pose(figures_[tick], skin)))));
         size += ranges.back().size;
@@ -115,9 +122,10 @@ TickPoses::TickPoses(const Character& character, const PackedClips& bank) : char
   for (std::uint32_t clip = 0; clip < character.clipCount(); ++clip) {
     std::vector<std::vector<JointMatrix>>& all = poses_.emplace_back();
     for (std::uint32_t tick = 0; tick < character.tickCount(clip); ++tick) {
+      const auto layer = character.layer({clip, tick});
       for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
         std::vector<JointMatrix>& pose = all.emplace_back(bank.jointCount(skin));
-        must(samplePose(bank, character.layers({clip, tick}), skin, pose));
+        must(samplePose(bank, listOf(layer), skin, pose));
       }
     }
   }
@@ -141,13 +149,15 @@ void TickPoses::check(const PackedClips& bank) {
   const std::vector<ClipView> clips = gltf::clips(character_->model());
   for (std::uint32_t clip = 0; clip < character_->clipCount(); ++clip) {
     for (std::uint32_t tick = 0; tick < character_->tickCount(clip); ++tick) {
+      const auto layer = character_->layer({clip, tick});
       for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
         const std::span<const JointMatrix> sampled = pose({clip, tick}, skin);
-        const reference::SampledPose exact = must(reference::samplePose(
-            skeleton, clips, {}, character_->layers({clip, tick}), skin, &bank));
+        const reference::SampledPose exact =
+            must(reference::samplePose(skeleton, clips, {}, listOf(layer), skin, &bank));
         for (std::size_t joint = 0; joint < sampled.size(); ++joint) {
           const auto [atJoint, perDistance] = exact.bounds[joint];
-          if (!std::isfinite(atJoint + perDistance)) continue;  // it has no frame of its own
+          if (!std::isfinite(atJoint + perDistance))
+            continue;  // its inverse bind matrix is singular
           const glm::dmat4 error =
               (matrixOf(sampled[joint].m) - matrixOf(exact.joints[joint])) *
               glm::inverse(matrixOf(skeleton.skins[skin].inverseBind[joint].m));

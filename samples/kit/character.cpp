@@ -101,10 +101,10 @@ Skeleton Character::skeleton() const {
   return skeleton;
 }
 
-std::vector<ClipLayer> Character::layers(PoseKey key) const {
-  if (model_->clips.empty()) return {};
+std::optional<ClipLayer> Character::layer(PoseKey key) const {
+  if (model_->clips.empty()) return std::nullopt;
   const double duration = model_->clips[key.clip].duration;
-  return {{.clip = key.clip, .time = duration * key.tick / tickCount(key.clip)}};
+  return ClipLayer{.clip = key.clip, .time = duration * key.tick / tickCount(key.clip)};
 }
 
 std::uint64_t Character::vertexCount() const {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -58,7 +59,7 @@ class Character {
   /// Its skeleton, with the skins of `jointCounts`.
   Skeleton skeleton() const;
   /// What a figure plays at a moment; nothing if the file has no clips.
-  std::vector<ClipLayer> layers(PoseKey key) const;
+  std::optional<ClipLayer> layer(PoseKey key) const;
 
  private:
   /// A clip, sampled once. Figures at the same tick of a clip have the same pose.

@@ -3,7 +3,7 @@
 // poses that the CPU writes. Process CPU time of the best of several frames, and the CPU's share:
 // `play`, plan and record.
 //
-//   dermis_clips_benchmark MODEL [FIGURES [FRAMES]]
+//   dermis_clips_benchmark MODEL [FIGURES [FRAMES [MAX-ERROR]]]
 
 #include <fmt/format.h>
 
@@ -11,6 +11,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <span>
@@ -124,14 +125,16 @@ std::uint32_t numberOr(int argc, char** argv, int place, std::uint32_t otherwise
 
 int run(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "dermis_clips_benchmark MODEL [FIGURES [FRAMES]]\n");
+    fmt::print(stderr, "dermis_clips_benchmark MODEL [FIGURES [FRAMES [MAX-ERROR]]]\n");
     return 2;
   }
   const std::uint32_t count = numberOr(argc, argv, 2, 1000), frames = numberOr(argc, argv, 3, 8);
   const gltf::Model model = must(gltf::load(argv[1]));
   PackClipsReport report;
   const Skeleton skeleton = gltf::skeleton(model);
-  const PackedClips bank = must(packClips(skeleton, gltf::clips(model), {}, &report));
+  const double maxError = argc > 4 ? std::atof(argv[4]) : 0;
+  const PackedClips bank =
+      must(packClips(skeleton, gltf::clips(model), {.maxError = maxError}, &report));
   samples::OpenDevice open = must(samples::openDevice({}));
   fmt::print("{}; {} clips of {} joints in {} bytes; {} figures\n", open.device->info().name,
              bank.clipCount(), bank.jointCount(0), report.byteCount, count);

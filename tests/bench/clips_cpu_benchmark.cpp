@@ -5,7 +5,7 @@
 //
 //   dermis_clips_cpu_benchmark MODEL [FIGURES [ROUNDS]]    1,000 figures, 100 rounds
 //
-// Each figure plays a pair of clips of its own, with its own times and weights. A round is a frame:
+// Clips, times and weights differ from figure to figure. A round is a frame:
 // times advance by a sixtieth of a second, forward, as ozz-animation prefers it.
 
 #include <algorithm>

@@ -79,7 +79,7 @@ class ModelSteps {
   virtual std::vector<RefusedCall> callsBetweenFrames() = 0;
   /// Differs if the output has become another buffer.
   virtual std::uint64_t outputNow() = 0;
-  /// The pose of a figure that plays this (played_clips.h), in a scene of its own.
+  /// The pose of the only figure of a scene, if it plays this (played_clips.h).
   virtual std::vector<JointMatrix> sampleAlone(std::uint32_t play, std::uint32_t skin) = 0;
   /// An instance skinned alone.
   virtual Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,

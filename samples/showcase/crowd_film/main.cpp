@@ -98,11 +98,13 @@ class SkinnedCrowd {
         visibility.push_back({instance, figure.now.isInView, figure.now.updateInterval});
     }
     must(recorder_.scene().setVisibility(visibility));
-    std::vector<std::vector<ClipLayer>> layers;
+    std::vector<ClipLayer> layers;
     std::vector<FigurePlay> plays;
+    layers.reserve(figures_.size());  // plays point to them
     for (const Figure& figure : figures_) {
-      layers.push_back(character_->layers(figure.now.pose));
-      plays.push_back({figure.handle, layers.back()});
+      const auto layer = character_->layer(figure.now.pose);
+      if (layer) layers.push_back(*layer);
+      plays.push_back({figure.handle, std::span(layers).last(layer ? 1 : 0)});
     }
     must(recorder_.scene().play(plays));
     context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::vertexInput, Use::dermis));
