@@ -163,8 +163,9 @@ void checkClips(const PackedRig& rig, const MeshView& mesh, std::uint32_t skin, 
                 std::uint32_t times, std::mt19937& random, Ratios& ratios) {
   const Result<JointBounds> joints = jointBounds(mesh, rig.bank->jointCount(skin));
   ASSERT_TRUE(joints.ok()) << joints.error().message;
-  const JointPromise promise =
-      isRigid(*rig.bank, skin) && chance(random, 50) ? JointPromise::rigid : JointPromise::scaling;
+  const JointPromise promise = rigidSkins(*rig.bank)[skin] && chance(random, 50)
+                                   ? JointPromise::rigid
+                                   : JointPromise::scaling;
   for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
     SCOPED_TRACE("clip " + std::to_string(clip));
     const auto start = std::chrono::steady_clock::now();

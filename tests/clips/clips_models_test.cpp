@@ -211,7 +211,7 @@ TEST(ClipsModels, JointsOfSkinsThatAreCalledRigidNeverScale) {
         for (const JointMatrix& joint : rig.sample(randomLayers(rig, random), skin))
           worst = std::max(worst, stretchOf(joint));
       }
-      if (isRigid(*rig.bank, skin)) {
+      if (rigidSkins(*rig.bank)[skin]) {
         ++rigid;
         EXPECT_LT(worst, 1e-5) << "skin " << skin;
       } else if (worst < 1e-6) {

@@ -52,7 +52,7 @@ Stretch scaleOf(const ClipBank& bank, std::size_t number) {
 
 }  // namespace
 
-bool isRigid(const PackedClips& clips, std::uint32_t number) {
+std::vector<bool> rigidSkins(const PackedClips& clips) {
   constexpr double tolerance = 2e-6;
   const ClipBank bank(clips);
   std::vector<Stretch> stretches(bank.header.nodeCount);
@@ -63,14 +63,19 @@ bool isRigid(const PackedClips& clips, std::uint32_t number) {
       stretches[i] = stretches[i] * stretchOf(bank.at<Affine<float>>(node.fixed));
     stretches[i] = stretches[i] * scaleOf(bank, i);
   }
-  const BankSkin skin = bank.skin(number);
-  for (std::size_t joint = 0; joint < skin.jointCount; ++joint) {
-    Stretch stretch = stretchOf(bank.at<Affine<float>>(skin.matrices + 12 * joint));
-    const std::uint32_t node = bank.words[skin.nodes + joint];
-    if (node != noNode) stretch = stretches[node] * stretch;
-    if (!(stretch.low >= 1 - tolerance && stretch.high <= 1 + tolerance)) return false;
-  }
-  return true;
+  const auto isRigid = [&](const BankSkin& skin) {
+    for (std::size_t joint = 0; joint < skin.jointCount; ++joint) {
+      Stretch stretch = stretchOf(bank.at<Affine<float>>(skin.matrices + 12 * joint));
+      const std::uint32_t node = bank.words[skin.nodes + joint];
+      if (node != noNode) stretch = stretches[node] * stretch;
+      if (!(stretch.low >= 1 - tolerance && stretch.high <= 1 + tolerance)) return false;
+    }
+    return true;
+  };
+  std::vector<bool> areRigid;
+  for (std::size_t skin = 0; skin < bank.header.skinCount; ++skin)
+    areRigid.push_back(isRigid(bank.skin(skin)));
+  return areRigid;
 }
 
 }  // namespace dermis

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "affine.h"
 #include "clips/bank.h"
@@ -34,9 +35,9 @@ DERMIS_CORE_API Result<PackedLayers> packLayers(const PackedClips& clips,
                                                 std::span<const ClipLayer> layers,
                                                 const char* subject);
 
-/// Whether all singular values of the joints of a skin are within 2e-6 of 1, and none mirrors,
-/// whatever is played. O(nodes × clips).
-bool isRigid(const PackedClips& clips, std::uint32_t skin);
+/// For each skin, whether all singular values of its joints are within 2e-6 of 1, and none mirrors,
+/// whatever is played. O(nodes × clips + joints).
+std::vector<bool> rigidSkins(const PackedClips& clips);
 
 /// Computes the global transforms of the nodes of a bank, one for each.
 DERMIS_CORE_API void sampleNodes(const PackedClips& clips, const PackedLayers& layers,

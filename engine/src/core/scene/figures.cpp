@@ -12,8 +12,7 @@ namespace dermis {
 Result<ClipsHandle> Scene::addClips(PackedClips clips) {
   SceneBooks& books = changed();
   SceneClips::Content content{std::move(clips), {}, {}};
-  for (std::uint32_t skin = 0; skin < content.bank.skinCount(); ++skin)
-    content.isRigid.push_back(isRigid(content.bank, skin));
+  content.isRigid = rigidSkins(content.bank);
   Range bytes;
   if (!books.owner_.isCpu) {
     content.device = deviceClips(content.bank);
