@@ -434,6 +434,11 @@ template <typename Record>
 void store(std::span<uint> words, std::size_t first, const Record& record) {
   std::memcpy(words.subspan(first, sizeof(Record) / 4).data(), &record, sizeof(Record));
 }
+/// Appends zeros up to a multiple of four words, at which records begin.
+template <typename Words>
+void alignToUnit(Words& words) {
+  words.resize((words.size() + 3) / 4 * 4);
+}
 
 }  // namespace dermis::abi
 #endif

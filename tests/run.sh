@@ -87,7 +87,7 @@ step "install" ./cmake/install-deps.sh
 outcome=0
 case $run in
   all)
-    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON || outcome=$?
+    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON -DCMAKE_UNITY_BUILD=ON || outcome=$?
     sanitized || outcome=$?
     ;;
   sanitized) sanitized || outcome=$? ;;

@@ -132,7 +132,7 @@ struct RenderOptions {
 };
 
 constexpr std::uint32_t largestSide = 16384;
-constexpr std::uint32_t mostInstances = 100'000;
+constexpr std::uint32_t mostDrawnInstances = 100'000;
 
 ExitStatus checkNumbers(const RenderOptions& options) {
   if (!std::isfinite(options.time)) return reportWrongUsage("--time must be a number of seconds");
@@ -140,8 +140,8 @@ ExitStatus checkNumbers(const RenderOptions& options) {
     return reportWrongUsage("--fps must be a number above 0");
   if (options.frames && *options.frames == 0)
     return reportWrongUsage("--frames must be at least 1");
-  if (options.instances == 0 || options.instances > mostInstances)
-    return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostInstances));
+  if (options.instances == 0 || options.instances > mostDrawnInstances)
+    return reportWrongUsage(fmt::format("--instances must be from 1 to {}", mostDrawnInstances));
   for (const std::uint32_t side : {options.width, options.height}) {
     if (side < 16 || side > largestSide)
       return reportWrongUsage(

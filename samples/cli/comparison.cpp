@@ -26,7 +26,7 @@ constexpr std::uint64_t verticesOnCpu = 1'500'000;
 constexpr std::uint64_t verticesOnGpu = 8'000'000;
 /// For small meshes with many joints: limits the joint matrices and palettes of all methods.
 constexpr std::uint64_t mostPaletteBytes = std::uint64_t{1} << 26;
-constexpr std::uint64_t mostInstances = 20'000;
+constexpr std::uint64_t mostComparedInstances = 20'000;
 /// Limit for all instances together, even if the number of instances was given.
 constexpr std::uint64_t mostVertices = 100'000'000;
 
@@ -76,8 +76,8 @@ Result<std::uint32_t> chooseInstances(const MethodComparison& comparison,
   std::uint64_t bytes = 0;
   for (const samples::SkinRequest& part : instance)
     bytes += part.pose.size() * (48 + 80 * (allMethods.size() - 1));
-  return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(std::min(wanted, mostPaletteBytes / bytes), 1, mostInstances));
+  return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
+      std::min(wanted, mostPaletteBytes / bytes), 1, mostComparedInstances));
 }
 
 double medianOf(std::vector<double> values) {

@@ -26,7 +26,7 @@
 namespace dermis::test {
 namespace {
 
-const std::string bar = std::string(sampleModels) + "/bar.glb";
+const std::string barFile = std::string(sampleModels) + "/bar.glb";
 const std::string arm = std::string(sampleModels) + "/arm.glb";
 
 struct Compared {
@@ -59,7 +59,7 @@ double number(const Compared& compared, Method method, const char* group, const 
 
 // TRUTHS.md, lines 9 to 11. Rings and sides are fine enough for 2e-4 of the volume.
 TEST(CompareCommandTest, TheTubeKeepsWhatTheorySays) {
-  const Compared compared = compare({bar, "--device", "cpu"});
+  const Compared compared = compare({barFile, "--device", "cpu"});
   ASSERT_EQ(compared.result.status, 0) << compared.result.errors;
   ASSERT_EQ(compared.methods.size(), allMethods.size());
   const auto twist = [&](Method method, const char* name) {
@@ -116,11 +116,11 @@ TEST(CompareCommandTest, SharesOfTheWholeMeshMoveTheirMethodsOnly) {
 TEST(CompareCommandTest, TheReferenceIsNotTimed) {
   // It needs no driver.
   const CommandResult result =
-      dermis({"compare", bar, "--device", "reference"},
+      dermis({"compare", barFile, "--device", "reference"},
              {"VK_DRIVER_FILES=/nonexistent.json", "VK_ICD_FILENAMES=/nonexistent.json"});
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_NE(result.output.find("nothing"), std::string::npos) << result.output;
-  const Compared compared = compare({bar, "--device", "reference"});
+  const Compared compared = compare({barFile, "--device", "reference"});
   for (const auto& [name, method] : compared.methods) {
     EXPECT_TRUE(method["time"].is_null()) << name;
     EXPECT_GT(method["instructions"].get<int>(), 20) << name;
@@ -131,10 +131,10 @@ TEST(CompareCommandTest, TheCpuTimesTheEverydayMethods) {
   const std::vector<std::string> noDriver{"VK_DRIVER_FILES=/nonexistent.json",
                                           "VK_ICD_FILENAMES=/nonexistent.json"};
   const CommandResult result = dermis(
-      {"compare", bar, "--device", "cpu", "--instances", "10", "--repetitions", "2"}, noDriver);
+      {"compare", barFile, "--device", "cpu", "--instances", "10", "--repetitions", "2"}, noDriver);
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_NE(result.output.find("one thread"), std::string::npos) << result.output;
-  const Compared compared = compare({bar, "--device", "cpu", "--instances", "10"});
+  const Compared compared = compare({barFile, "--device", "cpu", "--instances", "10"});
   EXPECT_EQ(compared.json["clock"], "oneThread");
   EXPECT_EQ(compared.json["instances"], 10);
   for (const Method method : allMethods) {
@@ -151,22 +151,23 @@ TEST(CompareCommandTest, WhatIsWrongHasItsStatus) {
   std::ofstream(noSkin) << R"({"asset": {"version": "2.0"}})";
   const std::vector<std::pair<int, std::vector<std::string>>> wrong{
       {2, {"compare"}},
-      {2, {"compare", bar, "--device", "cpu", "--time", "nan"}},
-      {2, {"compare", bar, "--device", "cpu", "--animation", "7"}},
-      {2, {"compare", bar, "--device", "cpu", "--repetitions", "0"}},
-      {2, {"compare", bar, "--device", "cpu", "--repetitions", "-1"}},
-      {2, {"compare", bar, "--device", "cpu", "--repetitions", "100000"}},
-      {2, {"compare", bar, "--device", "cpu", "--instances", "0"}},
-      {2, {"compare", bar, "--device", "cpu", "--dual-quaternion-weight", "1.5"}},
-      {2, {"compare", bar, "--device", "cpu", "--bulge-strength", "-0.1"}},
-      {2, {"compare", bar, "--device", "cpu", "--bulge-strength", "nan"}},
-      {2, {"skin", bar, "-o", outFile("a.ply"), "--device", "cpu", "--bulge-strength", "2"}},
+      {2, {"compare", barFile, "--device", "cpu", "--time", "nan"}},
+      {2, {"compare", barFile, "--device", "cpu", "--animation", "7"}},
+      {2, {"compare", barFile, "--device", "cpu", "--repetitions", "0"}},
+      {2, {"compare", barFile, "--device", "cpu", "--repetitions", "-1"}},
+      {2, {"compare", barFile, "--device", "cpu", "--repetitions", "100000"}},
+      {2, {"compare", barFile, "--device", "cpu", "--instances", "0"}},
+      {2, {"compare", barFile, "--device", "cpu", "--dual-quaternion-weight", "1.5"}},
+      {2, {"compare", barFile, "--device", "cpu", "--bulge-strength", "-0.1"}},
+      {2, {"compare", barFile, "--device", "cpu", "--bulge-strength", "nan"}},
+      {2, {"skin", barFile, "-o", outFile("a.ply"), "--device", "cpu", "--bulge-strength", "2"}},
       {2,
-       {"skin", bar, "-o", outFile("a.ply"), "--device", "cpu", "--dual-quaternion-weight", "-1"}},
+       {"skin", barFile, "-o", outFile("a.ply"), "--device", "cpu", "--dual-quaternion-weight",
+        "-1"}},
       {3, {"compare", broken}},
       {3, {"compare", noSkin}},
       {3, {"compare", outFile("does not exist.glb")}},
-      {5, {"compare", bar, "--device", "cpu", "--json", "/nonexistent/folder/out.json"}},
+      {5, {"compare", barFile, "--device", "cpu", "--json", "/nonexistent/folder/out.json"}},
   };
   for (const auto& [status, arguments] : wrong) {
     const CommandResult result = dermis(arguments);
@@ -178,21 +179,21 @@ TEST(CompareCommandTest, WhatIsWrongHasItsStatus) {
 
 TEST(CompareCommandTest, AnUnknownDeviceEndsWithFour) {
   REQUIRE_DEVICE();
-  const CommandResult result = dermis({"compare", bar, "--device", "no such device"});
+  const CommandResult result = dermis({"compare", barFile, "--device", "no such device"});
   EXPECT_EQ(result.status, 4);
   expectOneErrorLine(result);
 }
 
 TEST(CompareCommandTest, TooManyVerticesAreWrongUsage) {
   REQUIRE_DEVICE();
-  const CommandResult result = dermis({"compare", bar, "--instances", "4000000"});
+  const CommandResult result = dermis({"compare", barFile, "--instances", "4000000"});
   EXPECT_EQ(result.status, 2);
   expectOneErrorLine(result);
 }
 
 TEST(CompareCommandTest, SkinTakesEveryMethodAndNamesThemAll) {
   const CommandResult unknown =
-      dermis({"skin", bar, "-o", outFile("a.ply"), "--device", "cpu", "--method", "cubic"});
+      dermis({"skin", barFile, "-o", outFile("a.ply"), "--device", "cpu", "--method", "cubic"});
   EXPECT_EQ(unknown.status, 2);
   const CommandResult help = dermis({"skin", "--help"});
   EXPECT_EQ(help.status, 0);
@@ -201,7 +202,7 @@ TEST(CompareCommandTest, SkinTakesEveryMethodAndNamesThemAll) {
     EXPECT_NE(unknown.errors.find(name), std::string::npos) << unknown.errors;
     EXPECT_NE(help.output.find(name), std::string::npos) << help.output;
     const CommandResult result =
-        dermis({"skin", bar, "-o", outFile(name + ".ply"), "--time", "1", "--device",
+        dermis({"skin", barFile, "-o", outFile(name + ".ply"), "--time", "1", "--device",
                 isForComparison(method) ? "reference" : "cpu", "--method", name});
     EXPECT_EQ(result.status, 0) << name << ": " << result.errors;
     EXPECT_TRUE(readPly(outFile(name + ".ply")).has_value()) << name;

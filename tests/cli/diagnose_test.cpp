@@ -13,11 +13,11 @@
 namespace dermis::test {
 namespace {
 
-const std::string figure = std::string(sampleModels) + "/figure.glb";
+const std::string figurePath = std::string(sampleModels) + "/figure.glb";
 
 /// The pose of the figure at a time of its first clip.
 std::vector<JointMatrix> poseOfFigure(double time) {
-  const Result<gltf::Model> model = gltf::load(figure);
+  const Result<gltf::Model> model = gltf::load(figurePath);
   if (!model) return {};
   return gltf::pose(*model, model->skinnedPrimitives.at(0).skin, 0, time);
 }
@@ -36,7 +36,7 @@ std::string writePose(const std::string& name, const std::vector<JointMatrix>& p
 
 TEST(DiagnoseCommandTest, TheModelsOwnPoseIsPlausible) {
   for (const std::string time : {"0", "0.7"}) {
-    const CommandResult result = dermis({"diagnose", figure, "--time", time});
+    const CommandResult result = dermis({"diagnose", figurePath, "--time", time});
     EXPECT_EQ(result.status, 0) << result.output << result.errors;
     EXPECT_TRUE(result.output.starts_with("plausible  ")) << result.output;
   }
@@ -44,7 +44,8 @@ TEST(DiagnoseCommandTest, TheModelsOwnPoseIsPlausible) {
 
 TEST(DiagnoseCommandTest, APoseOfAFileIsPlausibleOrWrong) {
   std::vector<JointMatrix> pose = poseOfFigure(0.7);
-  const CommandResult sound = dermis({"diagnose", figure, "--pose", writePose("sound.txt", pose)});
+  const CommandResult sound =
+      dermis({"diagnose", figurePath, "--pose", writePose("sound.txt", pose)});
   EXPECT_EQ(sound.status, 0) << sound.output << sound.errors;
   EXPECT_NE(sound.output.find("not tested: root transform missing: pass "), std::string::npos)
       << sound.output;
@@ -56,7 +57,7 @@ TEST(DiagnoseCommandTest, APoseOfAFileIsPlausibleOrWrong) {
   const std::string wrong = writePose("wrong.txt", pose);
   for (const std::vector<std::string>& more :
        {std::vector<std::string>{}, std::vector<std::string>{"--time", "0.7"}}) {
-    std::vector<std::string> arguments{"diagnose", figure, "--pose", wrong};
+    std::vector<std::string> arguments{"diagnose", figurePath, "--pose", wrong};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const CommandResult result = dermis(arguments);
     EXPECT_EQ(result.status, 1) << result.output << result.errors;
@@ -71,7 +72,7 @@ TEST(DiagnoseCommandTest, WrongFilesAreRefused) {
   const auto refused = [](const std::string& text, const std::string& complaint) {
     const std::string path = outFile("refused.txt");
     std::ofstream(path) << text;
-    const CommandResult result = dermis({"diagnose", figure, "--pose", path});
+    const CommandResult result = dermis({"diagnose", figurePath, "--pose", path});
     EXPECT_EQ(result.status, 3);
     expectOneErrorLine(result);
     EXPECT_NE(result.errors.find(complaint), std::string::npos) << result.errors;
@@ -81,10 +82,10 @@ TEST(DiagnoseCommandTest, WrongFilesAreRefused) {
   refused("1 0 0 0 0 1 0 0 0 0 1 0\n1 2 3\n",
           "line 2: a joint matrix has 12 numbers, row by row; this line has 3");
   refused("1 0 0 0 0 one 0 0 0 0 1 0\n", "line 1: 'one' is not a number");
-  const CommandResult absent = dermis({"diagnose", figure, "--pose", outFile("absent.txt")});
+  const CommandResult absent = dermis({"diagnose", figurePath, "--pose", outFile("absent.txt")});
   EXPECT_EQ(absent.status, 3);
   expectOneErrorLine(absent);
-  EXPECT_EQ(dermis({"diagnose", figure, "--time", "nan"}).status, 2);
+  EXPECT_EQ(dermis({"diagnose", figurePath, "--time", "nan"}).status, 2);
 }
 
 }  // namespace

@@ -25,7 +25,7 @@
 namespace dermis::test {
 namespace {
 
-const std::string bar = std::string(sampleModels) + "/bar.glb";
+const std::string barPath = std::string(sampleModels) + "/bar.glb";
 const std::string good = "What stood here before is good.\n";
 
 std::string textOf(const std::string& path) {
@@ -61,7 +61,7 @@ mode_t permissionsOf(const std::string& path) {
 }
 
 std::vector<std::string> skinCommand(const std::string& out) {
-  return {dermisProgram, "skin", bar, "-o", out, "--device", "cpu"};
+  return {dermisProgram, "skin", barPath, "-o", out, "--device", "cpu"};
 }
 
 /// With files of at most 512 bytes: the kernel's answer is that of a full disk, and a signal.
@@ -97,7 +97,7 @@ TEST(FileOutputTest, AFullDiskLeavesWhatStoodThere) {
     EXPECT_TRUE(std::filesystem::is_symlink(link));
   }
   const std::string json = writeText(folder + "/report.json");
-  expectUntouched(folder, {dermisProgram, "compare", bar, "--device", "cpu", "--json", json});
+  expectUntouched(folder, {dermisProgram, "compare", barPath, "--device", "cpu", "--json", json});
   const std::string empty = emptyFolder("empty");
   expectUntouched(empty, skinCommand(empty + "/new.ply"));
 }
@@ -203,7 +203,7 @@ void expectRefusedOutput(std::vector<std::string> command, const std::string& wh
 TEST(FileOutputTest, TheModelIsNeverOverwritten) {
   const std::string folder = emptyFolder();
   const std::string model = folder + "/a0.glb";
-  std::filesystem::copy_file(bar, model);
+  std::filesystem::copy_file(barPath, model);
   std::filesystem::create_symlink("a0.glb", folder + "/soft.glb");
   std::filesystem::create_hard_link(model, folder + "/hard.glb");
   std::filesystem::create_hard_link(model, folder + "/b03.glb");
@@ -222,10 +222,10 @@ TEST(FileOutputTest, TheModelIsNeverOverwritten) {
       {"-o", "render", model, "-o", folder + "/film.png"},
       {"-o", "compare", model, "-o", folder + "/film.png"},
       {"--json", "compare", model, "--json", folder + "/soft.glb"},
-      {"-o", "skin", bar, "--clips", bar, "--clips", model, "-o", folder + "/soft.glb"},
-      {"-o", "render", bar, "--clips", model, "-o", folder + "/film.png"},
-      {"--json", "compare", bar, "--clips", model, "--json", folder + "/soft.glb"},
-      {"--json", "verify", bar, model, "--json", model},
+      {"-o", "skin", barPath, "--clips", barPath, "--clips", model, "-o", folder + "/soft.glb"},
+      {"-o", "render", barPath, "--clips", model, "-o", folder + "/film.png"},
+      {"--json", "compare", barPath, "--clips", model, "--json", folder + "/soft.glb"},
+      {"--json", "verify", barPath, model, "--json", model},
       {"--junit", "verify", model, "--junit", folder + "/hard.glb"},
   };
   for (const std::vector<std::string>& command : commands) {
@@ -243,9 +243,9 @@ TEST(FileOutputTest, TwoOutputsAreNotOneFile) {
   std::ofstream(there) << "kept";
   std::filesystem::create_symlink("there.json", link);
   const std::vector<std::vector<std::string>> commands{
-      {"--junit", "verify", bar, "--json", there, "--junit", link},
+      {"--junit", "verify", barPath, "--json", there, "--junit", link},
       {"--junit", "verify", "--json", folder + "/new", "--junit", folder + "/./new"},
-      {"--json", "compare", bar, "-o", folder + "/new.png", "--json", folder + "/new.png"},
+      {"--json", "compare", barPath, "-o", folder + "/new.png", "--json", folder + "/new.png"},
   };
   for (const std::vector<std::string>& command : commands) {
     expectRefusedOutput(command, " is also the output of -");
@@ -379,7 +379,7 @@ TEST(FileOutputTest, AnInterruptedCommandLeavesWholeFilesOnly) {
   const std::string pattern = folder + "/frame%06d.ply";
   const auto hasSome = [&] { return std::filesystem::exists(folder + "/frame000004.ply"); };
   const CommandResult result = runAndSignal(
-      {dermisProgram, "skin", bar, "-o", pattern, "--frames", "5000", "--device", "cpu"}, {},
+      {dermisProgram, "skin", barPath, "-o", pattern, "--frames", "5000", "--device", "cpu"}, {},
       hasSome, SIGINT);
   EXPECT_EQ(result.signal, SIGINT) << result.status << result.errors;
   const std::vector<std::string> names = namesIn(folder);

@@ -23,13 +23,13 @@
 namespace dermis::test {
 namespace {
 
-using Point = std::array<double, 3>;
+using Position = std::array<double, 3>;
 
 /// One vertex in one pose.
 struct ForeignVertex {
   std::size_t vertex = 0;
-  Point bind{};
-  std::vector<Point> skinned;  ///< by column: linear, and dual quaternions where there are two
+  Position bind{};
+  std::vector<Position> skinned;  ///< by column: linear, and dual quaternions where there are two
 };
 
 /// Model, clip and time.
@@ -45,23 +45,23 @@ ForeignPoses readPoses(const std::string& name) {
     std::string model, clip, time;
     ForeignVertex vertex;
     fields >> model >> clip >> time >> vertex.vertex;
-    const auto read = [&fields](Point& point) -> bool {
+    const auto read = [&fields](Position& point) -> bool {
       return static_cast<bool>(fields >> point[0] >> point[1] >> point[2]);
     };
     EXPECT_TRUE(read(vertex.bind)) << line;
-    for (Point point; read(point);) vertex.skinned.push_back(point);
+    for (Position point; read(point);) vertex.skinned.push_back(point);
     poses[{model, clip, time}].push_back(vertex);
   }
   return poses;
 }
 
-double distance(const Point& a, const Point& b) {
+double distance(const Position& a, const Position& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
 /// Of the bind pose: its box' diagonal.
 double sizeOf(const std::vector<ForeignVertex>& vertices) {
-  Point low = vertices[0].bind, high = low;
+  Position low = vertices[0].bind, high = low;
   for (const ForeignVertex& vertex : vertices) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       low[axis] = std::min(low[axis], vertex.bind[axis]);
@@ -71,8 +71,8 @@ double sizeOf(const std::vector<ForeignVertex>& vertices) {
   return distance(low, high);
 }
 
-Point pointAt(std::span<const float> positions, std::size_t vertex) {
-  Point point{};
+Position pointAt(std::span<const float> positions, std::size_t vertex) {
+  Position point{};
   for (std::size_t axis = 0; axis < 3; ++axis)
     point[axis] = static_cast<double>(positions[3 * vertex + axis]);
   return point;

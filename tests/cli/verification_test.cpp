@@ -25,7 +25,7 @@
 namespace dermis::test {
 namespace {
 
-const std::string bar = std::string(sampleModels) + "/bar.glb";
+const std::string barModel = std::string(sampleModels) + "/bar.glb";
 
 std::shared_ptr<samples::BatchTarget> makeTarget() {
   return std::make_shared<samples::CpuTarget>();
@@ -211,8 +211,9 @@ TEST(VerificationTest, QuickSkinsWithEveryMethodOfTheDeviceInAnyNumberOfThreads)
 
 TEST(VerificationTest, QuickLeavesOutCasesOfAModelToo) {
   const std::string json = outFile("all.json"), quickJson = outFile("quick_bar.json");
-  EXPECT_EQ(dermis({"verify", bar, "--device", "cpu", "--json", json}).status, 0);
-  EXPECT_EQ(dermis({"verify", bar, "--quick", "--device", "cpu", "--json", quickJson}).status, 0);
+  EXPECT_EQ(dermis({"verify", barModel, "--device", "cpu", "--json", json}).status, 0);
+  EXPECT_EQ(dermis({"verify", barModel, "--quick", "--device", "cpu", "--json", quickJson}).status,
+            0);
   const std::map<std::string, std::size_t> all = casesByMethod(json),
                                            quick = casesByMethod(quickJson);
   ASSERT_EQ(quick.size(), all.size());
@@ -220,7 +221,7 @@ TEST(VerificationTest, QuickLeavesOutCasesOfAModelToo) {
 }
 
 TEST(VerificationTest, ThreadsChangeNothingOnTheCpu) {
-  expectTheSameInThreads({"verify", bar, "--random", "--device", "cpu"});
+  expectTheSameInThreads({"verify", barModel, "--random", "--device", "cpu"});
 }
 
 }  // namespace

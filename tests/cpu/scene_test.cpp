@@ -18,13 +18,13 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t jointCount = 8, vertexCount = 1001;
+constexpr std::uint32_t sceneJoints = 8, sceneVertices = 1001;
 
 PackedMesh meshOf(std::uint32_t vertices) {
-  OwnedMesh mesh = randomMesh(1, vertices, jointCount, 4);
+  OwnedMesh mesh = randomMesh(1, vertices, sceneJoints, 4);
   addTangents(mesh, 2);
   addMorphs(mesh, 3, 3);
-  return must(pack(mesh.view(), jointCount));
+  return must(pack(mesh.view(), sceneJoints));
 }
 
 /// Instances of one mesh in a pose each.
@@ -38,7 +38,7 @@ class CpuSceneTest : public ::testing::Test {
     description.bounds = bounds;
     description.box = {{-2, -2, -2}, {2, 2, 2}};
     for (std::uint32_t i = 0; i < count; ++i) {
-      description.pose = must(engine_->addPose(jointCount));
+      description.pose = must(engine_->addPose(sceneJoints));
       poses_.push_back(description.pose);
       descriptions_.push_back(description);
       instances_.push_back(must(engine_->addInstance(description)));
@@ -48,7 +48,7 @@ class CpuSceneTest : public ::testing::Test {
     for (std::size_t i = 0; i < poses_.size(); ++i) engine_.writePose(poses_[i], poseOf(seed, i));
   }
   static std::vector<JointMatrix> poseOf(std::uint32_t seed, std::size_t index) {
-    return randomPose(seed * 100 + static_cast<std::uint32_t>(index), jointCount, Rigidity::rigid);
+    return randomPose(seed * 100 + static_cast<std::uint32_t>(index), sceneJoints, Rigidity::rigid);
   }
   /// What a job of the instance alone writes, and finds out.
   std::vector<std::byte> alone(std::size_t index, std::uint32_t seed, InstanceResult& found) const {
@@ -60,7 +60,7 @@ class CpuSceneTest : public ::testing::Test {
     return skinOne(packed_, descriptions_[index].method, descriptions_[index].layout, instance);
   }
 
-  PackedMesh packed_ = meshOf(vertexCount);
+  PackedMesh packed_ = meshOf(sceneVertices);
   CpuEngine engine_{{}};
   MeshHandle mesh_;
   std::vector<PoseHandle> poses_;
@@ -120,7 +120,7 @@ TEST_F(CpuSceneTest, NoBitDependsOnHowLongJobsAre) {
       EXPECT_LE(job.vertexCount(), std::max(vertices, 32u));
       cpu::skin(job);
     }
-    EXPECT_EQ(planned, 9u * vertexCount);
+    EXPECT_EQ(planned, 9u * sceneVertices);
     EXPECT_EQ(engine_->statistics().lastFrame.skinnedVertices, planned);
     EXPECT_EQ(engine_->statistics().lastFrame.frame, ++frame);
     if (first.empty()) first = engine_.readOutput();
@@ -129,14 +129,14 @@ TEST_F(CpuSceneTest, NoBitDependsOnHowLongJobsAre) {
 }
 
 TEST_F(CpuSceneTest, TheOutputMayBeTheEngines) {
-  const std::uint64_t size = std::uint64_t{vertexCount} * 24;
+  const std::uint64_t size = std::uint64_t{sceneVertices} * 24;
   // Room for a third one but for its last word, of which half is there.
   std::vector<std::byte> memory(size * 3 - 2 + 64, std::byte{0xa5});
   CpuEngine engine({}, std::span(memory).subspan(32, size * 3 - 2));
   engine.begin();
   InstanceDescription instance;
   instance.mesh = engine.addMesh(packed_);
-  instance.pose = must(engine->addPose(jointCount));
+  instance.pose = must(engine->addPose(sceneJoints));
   instance.layout = normalsToo();
   static_cast<void>(must(engine->addInstance(instance)));
   static_cast<void>(must(engine->addInstance(instance)));
@@ -158,7 +158,7 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
     EXPECT_EQ(result.error().code, ErrorCode::invalidArgument);
     EXPECT_NE(result.error().message.find(words), std::string::npos) << result.error().message;
   };
-  expectRefused(engine_->addPose(jointCount, {.writtenByGpu = true}), "GPU");
+  expectRefused(engine_->addPose(sceneJoints, {.writtenByGpu = true}), "GPU");
   InstanceDescription description = descriptions_[0];
   description.culledOnGpu = true;
   expectRefused(engine_->addInstance(description), "culled on the GPU");
@@ -251,8 +251,8 @@ TEST_F(CpuSceneTest, ANewBoxIsSkinnedAtOnceAndRestartsMotion) {
       const Streams streams = engine_.read(bytes, instances_[i]);
       EXPECT_TRUE(streams[positionStream] ==
                   readAttribute(expected,
-                                must(placeVertices(layout, vertexCount))[Stream::positions],
-                                vertexCount))
+                                must(placeVertices(layout, sceneVertices))[Stream::positions],
+                                sceneVertices))
           << frame << ", " << i;
       EXPECT_TRUE(streams[previousStream] == streams[positionStream]) << frame << ", " << i;
     }
@@ -263,7 +263,7 @@ TEST_F(CpuSceneTest, ANewBoxIsSkinnedAtOnceAndRestartsMotion) {
 TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
   engine_.begin();
   mesh_ = engine_.addMesh(packed_);
-  const std::vector<JointMatrix> pose = randomPose(1, jointCount, Rigidity::shear);
+  const std::vector<JointMatrix> pose = randomPose(1, sceneJoints, Rigidity::shear);
   std::vector<std::vector<std::byte>> outputs;
   // With normals it is the fast path.
   for (const VertexLayout& layout : {VertexLayout(), normalsToo()}) {
@@ -271,7 +271,7 @@ TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
       InstanceDescription description;
       description.mesh = mesh_;
       description.layout = layout;
-      description.pose = must(engine_->addPose(jointCount, {.promise = promise}));
+      description.pose = must(engine_->addPose(sceneJoints, {.promise = promise}));
       engine_.writePose(description.pose, pose);
       instances_.push_back(must(engine_->addInstance(description)));
       cpu::Instance instance;
@@ -294,7 +294,7 @@ TEST_F(CpuSceneTest, PosesThatMayNotScaleDoNot) {
 
 TEST_F(CpuSceneTest, PosesAreTheIdentityUntilTheyAreWritten) {
   engine_.begin();
-  const PoseHandle other = must(engine_->addPose(jointCount));  // whose place is used again
+  const PoseHandle other = must(engine_->addPose(sceneJoints));  // whose place is used again
   engine_.writePose(other, poseOf(1, 0));
   must(engine_->removePose(other));
   engine_.submit();
@@ -302,10 +302,10 @@ TEST_F(CpuSceneTest, PosesAreTheIdentityUntilTheyAreWritten) {
   add(1, normalsToo());
   engine_.submit();
   const InstanceOutput output = must(engine_->output(instances_[0]));
-  const OwnedMesh source = randomMesh(1, vertexCount, jointCount, 4);
+  const OwnedMesh source = randomMesh(1, sceneVertices, sceneJoints, 4);
   const std::vector<std::byte> positions =
-      readAttribute(engine_.readOutput(), output.places[Stream::positions], vertexCount);
-  for (std::size_t i = 0; i < vertexCount * 3u; ++i) {
+      readAttribute(engine_.readOutput(), output.places[Stream::positions], sceneVertices);
+  for (std::size_t i = 0; i < sceneVertices * 3u; ++i) {
     float value;
     std::memcpy(&value, positions.data() + i * 4, 4);
     ASSERT_NEAR(value, source.positions[i], 1e-6f * (1 + std::abs(value))) << i;

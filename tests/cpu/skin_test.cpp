@@ -24,7 +24,7 @@ using samples::randomMesh;
 using samples::randomPose;
 using samples::Rigidity;
 
-constexpr std::uint32_t jointCount = 30, instanceCount = 7;
+constexpr std::uint32_t crowdJoints = 30, crowdSize = 7;
 constexpr Box box{{-8, -8, -8}, {8, 8, 8}};
 
 constexpr std::array everydayMethods{Method::linear, Method::dualQuaternion, Method::blended,
@@ -62,15 +62,15 @@ bool isUntouched(std::span<const std::byte> bytes) {
 struct Crowd {
   Crowd(std::uint32_t vertexCount, std::uint32_t influences, Rigidity rigidity,
         const VertexLayout& wanted)
-      : layout(wanted), source(randomMesh(influences, vertexCount, jointCount, influences)) {
+      : layout(wanted), source(randomMesh(influences, vertexCount, crowdJoints, influences)) {
     samples::addTangents(source, 3);
     samples::addMorphs(source, 5, 3);
     addDenseMorphs();
-    mesh.emplace(cpu::Mesh::create(pack(source.view(), jointCount).value()).value());
+    mesh.emplace(cpu::Mesh::create(pack(source.view(), crowdJoints).value()).value());
     places = placeVertices(layout, vertexCount).value();
-    output.assign(places.size * instanceCount, untouched);
-    for (std::uint32_t i = 0; i < instanceCount; ++i) {
-      poses.push_back(randomPose(40 + i, jointCount, rigidity));
+    output.assign(places.size * crowdSize, untouched);
+    for (std::uint32_t i = 0; i < crowdSize; ++i) {
+      poses.push_back(randomPose(40 + i, crowdJoints, rigidity));
       cpu::Instance instance;
       instance.pose = poses.back();
       instance.box = box;
@@ -174,7 +174,7 @@ TEST_P(CpuMethodTest, EveryVertexIsInsideItsBound) {
       for (const std::string_view target : cpu::targetNames()) {
         ASSERT_TRUE(cpu::setTarget(target).ok());
         crowd.skin(method);
-        for (std::size_t i = 0; i < instanceCount; ++i) {
+        for (std::size_t i = 0; i < crowdSize; ++i) {
           const Comparison comparison = crowd.compared(method, i);
           EXPECT_TRUE(comparison.passed())
               << target << ", instance " << i << ", vertex " << comparison.firstFailure << ": "
@@ -198,11 +198,11 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
         layoutOf(float32x3, float32x3, none, true), layoutOf(float32x4, octahedral16x2, none),
         layoutOf(float32x3, snorm8x4, float16x4), layoutOf(float32x3, none, none, false, true)}) {
     Crowd crowd(333, 5, rigidity, layout);
-    std::vector<InstanceResult> results(instanceCount);
-    for (std::size_t i = 1; i < instanceCount; i += 2) crowd.instances[i].result = &results[i];
+    std::vector<InstanceResult> results(crowdSize);
+    for (std::size_t i = 1; i < crowdSize; i += 2) crowd.instances[i].result = &results[i];
     crowd.instances[2].morphs = morphs;
     crowd.instances[5].restartsMotion = layout.motion;
-    crowd.poses[3] = randomPose(5, jointCount, Rigidity::shear);
+    crowd.poses[3] = randomPose(5, crowdJoints, Rigidity::shear);
     for (JointMatrix& joint : crowd.poses[4]) {
       for (auto& row : joint.m) {
         for (float& entry : row) entry *= 0x1p-20f;  // not moderate
@@ -214,7 +214,7 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
     const std::vector<InstanceResult> found = results;
     const auto expectSame = [&](const std::string& what) {
       EXPECT_TRUE(crowd.output == first) << what;
-      for (std::size_t i = 0; i < instanceCount; ++i) {
+      for (std::size_t i = 0; i < crowdSize; ++i) {
         EXPECT_TRUE(std::ranges::equal(results[i].orderedMin, found[i].orderedMin) &&
                     std::ranges::equal(results[i].orderedMax, found[i].orderedMax))
             << what << ", instance " << i;
@@ -226,15 +226,15 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
       crowd.skin(method);
       expectSame(std::string(target));
       std::ranges::fill(crowd.output, untouched);
-      std::vector<InstanceResult> all(instanceCount);
+      std::vector<InstanceResult> all(crowdSize);
       std::uint32_t begin = 0;
       for (const std::uint32_t end : {13u, 15u, 100u, 104u, 250u, 0xffffffffu}) {
-        for (std::size_t i = 0; i < instanceCount; i += 3) {
+        for (std::size_t i = 0; i < crowdSize; i += 3) {
           cpu::Job job = crowd.job(method, begin, end);
-          job.instances = job.instances.subspan(i, std::min<std::size_t>(3, instanceCount - i));
+          job.instances = job.instances.subspan(i, std::min<std::size_t>(3, crowdSize - i));
           ASSERT_TRUE(cpu::skin(job).ok());
         }
-        for (std::size_t i = 1; i < instanceCount; i += 2) cpu::addResult(all[i], results[i]);
+        for (std::size_t i = 1; i < crowdSize; i += 2) cpu::addResult(all[i], results[i]);
         begin = end;
       }
       results.swap(all);
@@ -327,7 +327,7 @@ TEST_F(CpuSkinTest, MatricesAtTheEdgesOfFloat32StayInsideTheBounds) {
     }
     for (const Method method : everydayMethods) {
       crowd.skin(method);
-      for (std::size_t i = 0; i < instanceCount; ++i) {
+      for (std::size_t i = 0; i < crowdSize; ++i) {
         const Comparison comparison = crowd.compared(method, i);
         EXPECT_TRUE(comparison.passed())
             << even << ", " << odd << ", " << methodName(method) << ", vertex "
@@ -391,8 +391,7 @@ TEST_F(CpuSkinTest, MeshesOfManyJointsAreSkinnedInSections) {
 
 TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
   Crowd crowd(203, 4, Rigidity::rigid, plainLayout);
-  std::vector<InstanceResult> results(instanceCount),
-      parts(instanceCount, {{0, 0, 0}, {~0u, ~0u, ~0u}, 9});
+  std::vector<InstanceResult> results(crowdSize), parts(crowdSize, {{0, 0, 0}, {~0u, ~0u, ~0u}, 9});
   const auto expectBounds = [&](const InstanceResult& result, std::size_t i, std::uint32_t begin,
                                 std::uint32_t end) {
     const Box found = result.box().value();
@@ -408,22 +407,22 @@ TEST_F(CpuSkinTest, BoundsAreThoseOfThePositions) {
       EXPECT_EQ(found.max[axis], greatest) << begin;
     }
   };
-  for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &results[i];
+  for (std::size_t i = 0; i < crowdSize; ++i) crowd.instances[i].result = &results[i];
   crowd.skin(Method::dualQuaternion);
-  for (std::size_t i = 0; i < instanceCount; ++i) expectBounds(results[i], i, 0, 203);
+  for (std::size_t i = 0; i < crowdSize; ++i) expectBounds(results[i], i, 0, 203);
   // By parts; what the results were before does not matter.
-  std::vector<InstanceResult> sums(instanceCount);
-  for (std::size_t i = 0; i < instanceCount; ++i) crowd.instances[i].result = &parts[i];
+  std::vector<InstanceResult> sums(crowdSize);
+  for (std::size_t i = 0; i < crowdSize; ++i) crowd.instances[i].result = &parts[i];
   std::uint32_t begin = 0;
   for (const std::uint32_t end : {77u, 79u, 203u}) {
     ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
-    for (std::size_t i = 0; i < instanceCount; ++i) {
+    for (std::size_t i = 0; i < crowdSize; ++i) {
       expectBounds(parts[i], i, begin, end);
       cpu::addResult(sums[i], parts[i]);
     }
     begin = end;
   }
-  EXPECT_EQ(std::memcmp(sums.data(), results.data(), sizeof(InstanceResult) * instanceCount), 0);
+  EXPECT_EQ(std::memcmp(sums.data(), results.data(), sizeof(InstanceResult) * crowdSize), 0);
 }
 
 TEST_F(CpuSkinTest, PositionsOutsideTheBoxAreClampedAndCounted) {
@@ -510,24 +509,24 @@ TEST_F(CpuSkinTest, PreviousPositionsAreKeptRestartedAndSettled) {
   }
   crowd.skin(Method::dualQuaternion);
   std::vector<std::vector<std::byte>> old;
-  for (std::size_t i = 0; i < instanceCount; ++i) {
+  for (std::size_t i = 0; i < crowdSize; ++i) {
     old.push_back(streamOf(i, positions));
     EXPECT_TRUE(streamOf(i, previous) == old.back()) << "restarted";
   }
-  for (std::size_t i = 0; i < instanceCount; ++i) {
-    crowd.poses[i] = randomPose(70 + static_cast<std::uint32_t>(i), jointCount, Rigidity::rigid);
+  for (std::size_t i = 0; i < crowdSize; ++i) {
+    crowd.poses[i] = randomPose(70 + static_cast<std::uint32_t>(i), crowdJoints, Rigidity::rigid);
     crowd.instances[i].restartsMotion = false;
     crowd.instances[i].morphs = now;
   }
   crowd.place();
   ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion)).ok());
-  for (std::size_t i = 0; i < instanceCount; ++i) {
+  for (std::size_t i = 0; i < crowdSize; ++i) {
     EXPECT_TRUE(streamOf(i, previous) == old[i]);
     EXPECT_FALSE(streamOf(i, positions) == old[i]);
     crowd.instances[i].settles = true;
   }
   ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion)).ok());
-  for (std::size_t i = 0; i < instanceCount; ++i)
+  for (std::size_t i = 0; i < crowdSize; ++i)
     EXPECT_TRUE(streamOf(i, previous) == streamOf(i, positions)) << "settled";
 }
 
@@ -610,7 +609,7 @@ TEST_F(CpuSkinTest, AttributesMayGoToArraysOfTheirOwn) {
       job.places[Stream::previousPositions] = {0, 12, VertexFormat::float32x3};
   job.places[Stream::normals] = {0, 12, VertexFormat::float32x3};
   job.places[Stream::tangents] = {4, 20, VertexFormat::float32x4};
-  for (std::size_t i = 0; i < instanceCount; ++i) {
+  for (std::size_t i = 0; i < crowdSize; ++i) {
     std::vector<float> positions(300), normals(300), tangents(501), previous(300);
     apart.instances[i].output = {positions.data(), normals.data(), tangents.data(),
                                  previous.data()};

@@ -70,7 +70,7 @@ void expectSameBytes(const samples::SkinnedVertices& a, const samples::SkinnedVe
 
 // ---- 20: no bit depends on how the work is cut up
 
-struct Crowd {
+struct MixedCrowd {
   std::vector<OwnedMesh> meshes;
   std::vector<PackedMesh> packedMeshes;
   std::vector<std::vector<JointMatrix>> poses;
@@ -78,8 +78,8 @@ struct Crowd {
 };
 
 /// Rigid and scaled instances of three meshes.
-Crowd crowdOf(Method method) {
-  Crowd crowd;
+MixedCrowd crowdOf(Method method) {
+  MixedCrowd crowd;
   const std::uint32_t vertices[] = {65, 200, 333}, influences[] = {1, 4, 7};
   for (std::uint32_t mesh = 0; mesh < 3; ++mesh) {
     OwnedMesh& owned =
@@ -99,7 +99,7 @@ Crowd crowdOf(Method method) {
 }
 
 TEST_P(MethodTest, Truth20_TuningChangesNoBit) {
-  const Crowd crowd = crowdOf(GetParam());
+  const MixedCrowd crowd = crowdOf(GetParam());
   const samples::BatchResult first = run(crowd.requests);
   ASSERT_EQ(first.instances.size(), crowd.requests.size());
   constexpr std::array tunings{Tuning{8, 1}, Tuning{16, 2}, Tuning{32, 5, 1000},
@@ -125,7 +125,7 @@ TEST_P(MethodTest, Truth20_TuningChangesNoBit) {
 
 // First, last, alone, among all other methods, and beside a palette that may scale or not.
 TEST_P(MethodTest, Truth20_ThePlaceInTheBatchChangesNoBit) {
-  const Crowd crowd = crowdOf(GetParam());
+  const MixedCrowd crowd = crowdOf(GetParam());
   const samples::BatchResult together = run(crowd.requests);
   std::vector<samples::SkinRequest> backwards(crowd.requests.rbegin(), crowd.requests.rend());
   for (const Method method : allMethods) {
@@ -430,7 +430,7 @@ TEST_P(MethodTest, SharesMayBeTheMeshsOwn) {
 
 // One pose as dual quaternions and as logarithms, in one batch.
 TEST_P(MethodTest, APoseInTwoFormsIsTheSamePose) {
-  const Crowd crowd = crowdOf(GetParam());
+  const MixedCrowd crowd = crowdOf(GetParam());
   std::vector<samples::SkinRequest> requests;
   for (const samples::SkinRequest& request : crowd.requests) {
     requests.push_back(request);

@@ -12,7 +12,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t jointCount = 8;
+constexpr std::uint32_t movingJoints = 8;
 constexpr auto positions = static_cast<std::size_t>(Stream::positions);
 constexpr auto previous = static_cast<std::size_t>(Stream::previousPositions);
 
@@ -26,7 +26,7 @@ class MotionTest : public DeviceTest {
     options.output.motion = true;
     runner_ = samples::VulkanTarget(device(), context()).runner(options);
     for (std::uint32_t pose = 0; pose < 40; ++pose)
-      poses_.push_back(randomPose(pose, jointCount, Rigidity::rigid));
+      poses_.push_back(randomPose(pose, movingJoints, Rigidity::rigid));
   }
 
   samples::SkinRequest request(std::size_t pose) const {
@@ -42,8 +42,8 @@ class MotionTest : public DeviceTest {
     return result ? std::move(result->instances) : std::vector<samples::SkinnedVertices>(2);
   }
 
-  OwnedMesh mesh_ = randomMesh(1, 200, jointCount, 4);
-  PackedMesh packed_ = *pack(mesh_.view(), jointCount);
+  OwnedMesh mesh_ = randomMesh(1, 200, movingJoints, 4);
+  PackedMesh packed_ = *pack(mesh_.view(), movingJoints);
   std::vector<std::vector<JointMatrix>> poses_;
   std::unique_ptr<samples::BatchRunner> runner_;
 };

@@ -9,8 +9,8 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t vertexCount = 100;
-constexpr std::uint64_t instanceSize = vertexCount * 36;  // positions, normals, previous positions
+constexpr std::uint32_t meshVertices = 100;
+constexpr std::uint64_t instanceSize = meshVertices * 36;  // positions, normals, previous positions
 
 class SystemOverflowTest : public SystemTest {
  protected:
@@ -51,7 +51,7 @@ class SystemOverflowTest : public SystemTest {
                 alone(mesh, systemPose(before), instance_)[positionStream]);
   }
 
-  PackedMesh packed_ = systemMesh(1, vertexCount);
+  PackedMesh packed_ = systemMesh(1, meshVertices);
   std::optional<SystemEngine> engine_;
   InstanceDescription instance_;
   std::vector<PoseHandle> palettes_;

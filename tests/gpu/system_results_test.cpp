@@ -190,7 +190,7 @@ TEST_F(SystemResultsTest, OnlyWhatAFrameWritesIsReadBack) {
 TEST_F(SystemResultsTest, AnInstanceThatIsRefusedKeepsNoSlot) {
   vulkan::SceneRecorderDescription small = description();
   small.scene.boundsCapacity = Capacity::fixed(2);
-  small.scene.outputCapacity = Capacity::fixed(vertexCount * 24);
+  small.scene.outputCapacity = Capacity::fixed(crowdVertices * 24);
   SystemEngine engine(device(), context(), small);
   engine.begin();
   instance_.mesh = engine.addMesh(packed_);

@@ -11,7 +11,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t framesInFlight = 3;
+constexpr std::uint32_t queuedFrames = 3;
 
 /// Buffers that were created and not destroyed, and those that were copied from or to since the set
 /// was cleared: of each frame its tables, and what they were uploaded from.
@@ -61,7 +61,7 @@ class SystemTablesTest : public SystemTest {
     std::map<std::uint64_t, std::set<VkBuffer>> underWay;
     std::set<VkBuffer> tables;
     for (std::uint32_t pose = 1; pose <= 10; ++pose) {
-      engine.begin(framesInFlight - 1);
+      engine.begin(queuedFrames - 1);
       std::erase_if(underWay,
                     [&](const auto& entry) { return entry.first <= engine.completedFrame(); });
       engine.writePose(instance.pose, systemPose(pose));
@@ -77,8 +77,8 @@ class SystemTablesTest : public SystemTest {
             << "in frame " << engine.frame() << " a buffer of frame " << number << " is gone";
       }
     }
-    EXPECT_EQ(underWay.size(), framesInFlight);
-    EXPECT_GE(tables.size(), framesInFlight + 4) << "tables were replaced";
+    EXPECT_EQ(underWay.size(), queuedFrames);
+    EXPECT_GE(tables.size(), queuedFrames + 4) << "tables were replaced";
   }
 };
 
@@ -90,7 +90,7 @@ TEST_F(SystemTablesTest, OldTablesStayUntilTheirFramesAreComplete) {
     {
       vulkan::Context watched = must(vulkan::Context::create(intercepted.description()));
       vulkan::SceneRecorderDescription system = description();
-      system.scene.framesInFlight = framesInFlight;
+      system.scene.framesInFlight = queuedFrames;
       SystemEngine engine(device(), watched, system);
       const PackedMesh packed = systemMesh(1, 20);
       engine.begin();
@@ -110,8 +110,8 @@ TEST_F(SystemTablesTest, OldTablesStayUntilTheirFramesAreComplete) {
       for (const InstanceHandle handle : instances)
         ASSERT_TRUE(engine.read(bytes, handle)[positionStream] == expected[positionStream]);
       // With all frames complete there is no more than before, but one staging buffer a slot.
-      for (std::uint32_t frame = 0; frame < framesInFlight; ++frame) engine.runFrame();
-      EXPECT_LE(alive.size(), before + framesInFlight);
+      for (std::uint32_t frame = 0; frame < queuedFrames; ++frame) engine.runFrame();
+      EXPECT_LE(alive.size(), before + queuedFrames);
     }
     EXPECT_TRUE(alive.empty());
   }

@@ -10,7 +10,7 @@
 namespace dermis::test {
 
 inline constexpr std::uint32_t instanceCount = 60;
-inline constexpr std::uint32_t vertexCount = 256;
+inline constexpr std::uint32_t crowdVertices = 256;
 inline constexpr std::byte poison{0x5a};
 
 /// A crowd whose members can be culled on the GPU, and the words by which they are.
@@ -90,7 +90,7 @@ class SystemVisibilityTest : public SystemTest {
     }
   }
 
-  PackedMesh packed_ = systemMesh(1, vertexCount);
+  PackedMesh packed_ = systemMesh(1, crowdVertices);
   std::optional<SystemEngine> engine_;
   samples::MappedBuffer words_;
   InstanceDescription instance_;

@@ -10,15 +10,15 @@ TEST_F(SystemVisibilityTest, OnlyWhatMovesIsDispatched) {
   open(false, plainLayout());
   engine_->submit();
   const LastFrame all = engine_->lastFrame();
-  EXPECT_EQ(all.skinnedVertices, instanceCount * vertexCount);
-  EXPECT_EQ(all.writtenBytes, instanceCount * vertexCount * 24u);
+  EXPECT_EQ(all.skinnedVertices, instanceCount * crowdVertices);
+  EXPECT_EQ(all.writtenBytes, instanceCount * crowdVertices * 24u);
   engine_->begin();
   for (std::uint32_t i = 0; i < 6; ++i) engine_->writePose(palettes_[i * 10], systemPose(i));
   engine_->submit();
   const LastFrame few = engine_->lastFrame();
   EXPECT_EQ(few.skinnedInstances, 6u);
-  EXPECT_EQ(few.skinnedVertices, 6u * vertexCount);
-  EXPECT_EQ(few.writtenBytes, 6u * vertexCount * 24u);
+  EXPECT_EQ(few.skinnedVertices, 6u * crowdVertices);
+  EXPECT_EQ(few.writtenBytes, 6u * crowdVertices * 24u);
   EXPECT_EQ(few.convertedPoses, 6u);
   // Several instances share an invocation, so that the last group may hold fewer than it could.
   EXPECT_LE(few.workgroups * 5, all.workgroups);
@@ -37,7 +37,7 @@ TEST_F(SystemVisibilityTest, HiddenInstancesAreNotDispatched) {
   engine_->submit();
   const LastFrame few = engine_->lastFrame();
   EXPECT_EQ(few.skinnedInstances, 10u);
-  EXPECT_EQ(few.skinnedVertices, 10u * vertexCount);
+  EXPECT_EQ(few.skinnedVertices, 10u * crowdVertices);
   EXPECT_LE(few.workgroups * 4, allWorkgroups);
   EXPECT_EQ(few.convertedPoses, 10u) << "nobody looks at the others";
   const std::vector<std::byte> bytes = engine_->readOutput();

@@ -12,7 +12,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr double u = 1.0 / 16777216.0;  // 2^-24
+constexpr double unitRoundoff = 1.0 / 16777216.0;  // 2^-24
 
 /// Displacements of every vertex, or of those in `vertices`; empty arrays are absent attributes.
 struct OwnedTarget {
@@ -383,7 +383,7 @@ TEST_F(MorphTest, ALargeDisplacementIsStretchedByTheJoint) {
   EXPECT_DOUBLE_EQ(conditioning.stretch, 30);
   EXPECT_DOUBLE_EQ(conditioning.scale, 7 + 30 * 2);
   EXPECT_DOUBLE_EQ(positionBound(Method::linear, conditioning),
-                   6 * u * (7 + 30 * 2) + u * 30 * 2 * 2);
+                   6 * unitRoundoff * (7 + 30 * 2) + unitRoundoff * 30 * 2 * 2);
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ std::string sampleModel(const std::string& name) {
   return std::string(sampleModels) + "/" + name + ".glb";
 }
 
-CommandResult render(const std::string& model, const std::string& out,
-                     const std::vector<std::string>& more = {},
-                     const std::vector<std::string>& environment = {}) {
+CommandResult renderWith(const std::string& model, const std::string& out,
+                         const std::vector<std::string>& more = {},
+                         const std::vector<std::string>& environment = {}) {
   std::vector<std::string> arguments{"render",  model, "-o",       out,
                                      "--width", "320", "--height", "180"};
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -36,7 +36,7 @@ void expectRenderedAsReference(const std::string& name, const std::string& model
                                const std::vector<std::string>& arguments) {
   REQUIRE_DEVICE();
   const std::string out = outFile(name + ".png");
-  const CommandResult result = render(model, out, arguments);
+  const CommandResult result = renderWith(model, out, arguments);
   ASSERT_EQ(result.status, 0) << result.errors;
   EXPECT_TRUE(result.output.empty()) << result.output;
   const auto picture = readPng(out);
@@ -64,8 +64,8 @@ TEST(RenderReferenceTest, Crowd) {
 
 TEST(RenderCommandTest, WritesNumberedPictures) {
   REQUIRE_DEVICE();
-  const CommandResult result = render(sampleModel("arm"), outFile("frame%02d.png"),
-                                      {"--frames", "3", "--fps", "4", "--time", "0.5"});
+  const CommandResult result = renderWith(sampleModel("arm"), outFile("frame%02d.png"),
+                                          {"--frames", "3", "--fps", "4", "--time", "0.5"});
   ASSERT_EQ(result.status, 0) << result.errors;
   const auto first = readPng(outFile("frame00.png")), last = readPng(outFile("frame02.png"));
   ASSERT_TRUE(first && last);
@@ -122,7 +122,7 @@ TEST(RenderCommandTest, GivesAFilmsPicturesToFfmpeg) {
   std::filesystem::create_symlink("film.MP4", link);
   for (const std::string& out : {film, link}) {
     const CommandResult result =
-        render(sampleModel("bar"), out, {"--frames", "2"}, pathWith(programs));
+        renderWith(sampleModel("bar"), out, {"--frames", "2"}, pathWith(programs));
     ASSERT_EQ(result.status, 0) << result.errors;
     EXPECT_EQ(std::stoul(textOf(film)), 2u * 320 * 180 * 4);
     EXPECT_NE(textOf(programs + "/arguments").find("-s 320x180 -r 30"), std::string::npos);
@@ -158,8 +158,8 @@ class FailingFilm {
 
   void expectUntouched(const std::string& name) const {
     SCOPED_TRACE(name);
-    const CommandResult result = render(sampleModel("bar"), folder_ + "/" + name + ".gif",
-                                        {"--frames", "2"}, pathWith(programs_));
+    const CommandResult result = renderWith(sampleModel("bar"), folder_ + "/" + name + ".gif",
+                                            {"--frames", "2"}, pathWith(programs_));
     EXPECT_EQ(result.status, 5);
     expectOneErrorLine(result);
     EXPECT_EQ(filesIn(folder_), 5) << "nothing is removed, and nothing is left";
@@ -217,8 +217,9 @@ TEST(RenderCommandTest, ASignalEndsFfmpegAndLeavesTheOldFilm) {
 
 // Before anything is read or drawn.
 TEST(RenderCommandTest, NamesFfmpegWhereThereIsNone) {
-  const CommandResult result = render("no such model.glb", outFile("film.mp4"), {"--frames", "2"},
-                                      {"PATH=/nowhere", "VK_DRIVER_FILES=/nonexistent.json"});
+  const CommandResult result =
+      renderWith("no such model.glb", outFile("film.mp4"), {"--frames", "2"},
+                 {"PATH=/nowhere", "VK_DRIVER_FILES=/nonexistent.json"});
   EXPECT_EQ(result.status, 5);
   expectOneErrorLine(result);
   EXPECT_NE(result.errors.find("ffmpeg"), std::string::npos) << result.errors;

@@ -25,15 +25,15 @@ namespace {
 
 namespace render = samples::render;
 
-constexpr std::uint32_t width = 320, height = 120;
+constexpr std::uint32_t sheetWidth = 320, sheetHeight = 120;
 constexpr std::array twoMethods{Method::linear, Method::dualQuaternion};
 
 /// Rows from the first to the last that is not the background, in a column of pixels.
 std::uint32_t thickness(const render::Picture& picture, const render::Picture& background,
                         std::uint32_t column) {
-  std::uint32_t first = height, last = 0;
-  for (std::uint32_t row = 0; row < height; ++row) {
-    const std::size_t pixel = (std::size_t{row} * width + column) * 4;
+  std::uint32_t first = sheetHeight, last = 0;
+  for (std::uint32_t row = 0; row < sheetHeight; ++row) {
+    const std::size_t pixel = (std::size_t{row} * sheetWidth + column) * 4;
     for (std::size_t i = pixel; i < pixel + 3; ++i) {
       if (std::abs(picture.pixels[i] - background.pixels[i]) <= 2) continue;
       first = std::min(first, row);
@@ -87,18 +87,19 @@ class ComparisonTest : public DrawingTest {
 
   /// From the front, without a ground.
   render::Picture draw(const Box& box, std::span<const render::Draw> draws) {
-    render::FrameDescription description{width, height, 1, {512, 64, 4}};
+    render::FrameDescription description{sheetWidth, sheetHeight, 1, {512, 64, 4}};
     Result<render::RenderFrame> frame = renderer_->createFrame(description);
     EXPECT_TRUE(frame);
     render::View view;
-    view.area.extent = {width, height};
+    view.area.extent = {sheetWidth, sheetHeight};
     view.casters = box;
     view.style.rim = 0;
     view.style.keyColor = view.style.skyColor = glm::vec3(0.5f);
     render::CameraOptions camera;
     camera.isOrthographic = true;
     camera.azimuth = camera.elevation = 0;
-    view.camera = render::frameBoxes({&box, 1}, box, camera, static_cast<float>(width) / height);
+    view.camera =
+        render::frameBoxes({&box, 1}, box, camera, static_cast<float>(sheetWidth) / sheetHeight);
     view.draws = draws;
     const VkCommandBuffer commandBuffer = device().allocateCommandBuffer();
     VkCommandBufferBeginInfo begin{};
@@ -109,7 +110,7 @@ class ComparisonTest : public DrawingTest {
     device().functions().EndCommandBuffer(commandBuffer);
     EXPECT_TRUE(device().submitAndWait(commandBuffer));
     device().freeCommandBuffer(commandBuffer);
-    return {width, height, frame->target().pixels()};
+    return {sheetWidth, sheetHeight, frame->target().pixels()};
   }
 
   /// Of the built-in case.
@@ -148,10 +149,10 @@ TEST_F(ComparisonTest, TheMiddleOfTheTwistedBarIsPlainlyThinnerByLinearBlending)
     std::vector<render::Draw> draws;
     ASSERT_TRUE(figures.addDraws(method, draws));
     const render::Picture picture = draw(figures.box(), draws);
-    middle[method] = thickness(picture, background, width / 2);
-    end[method] = thickness(picture, background, width / 8);
+    middle[method] = thickness(picture, background, sheetWidth / 2);
+    end[method] = thickness(picture, background, sheetWidth / 8);
   }
-  EXPECT_GT(end[1], height / 3);
+  EXPECT_GT(end[1], sheetHeight / 3);
   EXPECT_EQ(end[0], end[1]);
   EXPECT_NEAR(middle[1], end[1], 2);
   EXPECT_LT(middle[0], 0.15 * middle[1]);

@@ -84,8 +84,8 @@ FileBuilder armed(bool swordsSkin = false) {
   return file;
 }
 
-std::optional<samples::render::Picture> render(const std::string& name, const FileBuilder& file,
-                                               const std::vector<std::string>& more = {}) {
+std::optional<samples::render::Picture> picturesOf(const std::string& name, const FileBuilder& file,
+                                                   const std::vector<std::string>& more = {}) {
   const std::string model = outFile(name + ".gltf"), out = outFile(name + ".png");
   std::ofstream(model) << file.text();
   std::vector<std::string> arguments{"render",   model, "-o",        out,  "--width", "240",
@@ -99,7 +99,7 @@ std::optional<samples::render::Picture> render(const std::string& name, const Fi
 
 TEST(RenderRigidMeshTest, MovesWithItsJointAndItsNodes) {
   REQUIRE_DEVICE();
-  const auto rigid = render("rigid", armed()), skinned = render("skinned", armed(true));
+  const auto rigid = picturesOf("rigid", armed()), skinned = picturesOf("skinned", armed(true));
   ASSERT_TRUE(rigid && skinned);
   EXPECT_TRUE(rigid->pixels == skinned->pixels);
   expectAsReference("sword", *rigid);
@@ -119,7 +119,8 @@ TEST(RenderRigidMeshTest, MovesByAClipOfAnotherFile) {
   clips.json["animations"][0]["channels"][1]["target"]["node"] = 0;
   const std::string file = outFile("clips.gltf");
   std::ofstream(file) << clips.text();
-  const auto own = render("own", armed()), others = render("others", figure, {"--clips", file});
+  const auto own = picturesOf("own", armed()),
+             others = picturesOf("others", figure, {"--clips", file});
   ASSERT_TRUE(own && others);
   EXPECT_TRUE(own->pixels == others->pixels);
 }

@@ -23,7 +23,7 @@ namespace {
 using reference::Double3;
 using reference::Double4;
 
-constexpr double u = 1.0 / 16777216.0;  // 2^-24
+constexpr double unitRoundoff = 1.0 / 16777216.0;  // 2^-24
 
 double distance(const Double3& a, const Double3& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -73,13 +73,13 @@ TEST(FormatBounds, FollowFromTheFormats) {
   for (const auto bound : {normalFormatBound, tangentFormatBound}) {
     EXPECT_EQ(bound(VertexFormat::float32x4), 0);
     EXPECT_NEAR(bound(VertexFormat::float16x4), 1 / 2048.0, 1e-7);
-    EXPECT_DOUBLE_EQ(bound(VertexFormat::snorm8x4), root3 * (1 / 254.0 + u));
-    EXPECT_DOUBLE_EQ(bound(VertexFormat::snorm16x4), root3 * (1 / 65534.0 + u));
+    EXPECT_DOUBLE_EQ(bound(VertexFormat::snorm8x4), root3 * (1 / 254.0 + unitRoundoff));
+    EXPECT_DOUBLE_EQ(bound(VertexFormat::snorm16x4), root3 * (1 / 65534.0 + unitRoundoff));
   }
   EXPECT_DOUBLE_EQ(normalFormatBound(VertexFormat::octahedral8x2),
-                   std::sqrt(18.0) * (1 / 254.0 + 12 * u));
+                   std::sqrt(18.0) * (1 / 254.0 + 12 * unitRoundoff));
   EXPECT_DOUBLE_EQ(normalFormatBound(VertexFormat::octahedral16x2),
-                   std::sqrt(18.0) * (1 / 65534.0 + 12 * u));
+                   std::sqrt(18.0) * (1 / 65534.0 + 12 * unitRoundoff));
   // (δ, 2δ, 3δ) but for 127 / 126.
   EXPECT_NEAR(tangentFormatBound(VertexFormat::octahedral8x2), std::sqrt(42.0) / 254, 2.5e-4);
   EXPECT_NEAR(tangentFormatBound(VertexFormat::octahedral16x2), std::sqrt(42.0) / 65534, 6e-6);
@@ -90,7 +90,7 @@ TEST(FormatBounds, FollowFromTheFormats) {
   EXPECT_DOUBLE_EQ(positionFormatBound(VertexFormat::float16x4, {0, 0, 0}, box),
                    root3 / 33554432.0);
   EXPECT_DOUBLE_EQ(positionFormatBound(VertexFormat::snorm16x3, {}, box),
-                   std::hypot(1 / 65534.0 + 8 * u, 3 / 65534.0 + 44 * u));
+                   std::hypot(1 / 65534.0 + 8 * unitRoundoff, 3 / 65534.0 + 44 * unitRoundoff));
 }
 
 struct RoundedNormal : public ::testing::TestWithParam<VertexFormat> {};

@@ -51,10 +51,6 @@ DeviceLimits limitsOfMemory() {
   return limits;
 }
 
-Error wrong(const std::string& what) {
-  return {ErrorCode::invalidArgument, what};
-}
-
 }  // namespace
 
 struct SceneRunner::State {
@@ -124,7 +120,8 @@ SceneRunner& SceneRunner::operator=(SceneRunner&&) noexcept = default;
 
 Result<SceneRunner> SceneRunner::create(const SceneDescription& description,
                                         std::span<std::byte> output) {
-  if (!output.empty() && output.size() < 4) return wrong("the output has fewer than 4 bytes");
+  if (!output.empty() && output.size() < 4)
+    return Error{ErrorCode::invalidArgument, "the output has fewer than 4 bytes"};
   SceneSetup setup{description, limitsOfMemory(), {128, 32}};
   setup.scene.framesInFlight = 1;
   if (!output.empty()) setup.scene.outputCapacity = Capacity::fixed(output.size() / 4 * 4);

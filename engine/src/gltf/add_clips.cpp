@@ -9,6 +9,7 @@
 
 #include "gltf/failure.h"
 #include "gltf/notes.h"
+#include "gltf/properties.h"
 #include "gltf/reader.h"
 #include "strict_floating_point.h"
 
@@ -171,14 +172,12 @@ class ClipMatcher {
   }
 
   void scale(Channel& channel) {
-    constexpr double largest = std::numeric_limits<float>::max();
     if (scale_ == 1) return;
     if (!std::exchange(isScaleNoted_, true)) {
       notes_.remark(NoteKind::unit, "in the model, nodes are ", scale_,
                     " times as far from their parents: translations are multiplied by this number");
     }
-    for (float& value : channel.values)
-      value = static_cast<float>(std::clamp(double{value} * scale_, -largest, largest));
+    for (float& value : channel.values) value = toFloat(double{value} * scale_);
   }
 
   void decomposeTarget(const Channel& channel) {

@@ -1,14 +1,11 @@
 #include <algorithm>
 
+#include "gltf/properties.h"
 #include "gltf/reader.h"
 #include "strict_floating_point.h"
 
 namespace dermis::gltf {
 namespace {
-
-float toFloat(double number) {
-  return static_cast<float>(number);
-}
 
 AlphaMode alphaModeOf(const std::string& name) {
   if (name == "MASK") return AlphaMode::mask;

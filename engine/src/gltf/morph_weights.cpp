@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "dermis/gltf.h"
+#include "gltf/properties.h"
 #include "gltf/reader.h"
 #include "strict_floating_point.h"
 
@@ -16,12 +16,6 @@ const Channel* findWeights(const Model& model, std::uint32_t node, std::uint32_t
   const auto placeOf = [](const Channel& channel) { return std::pair(channel.node, channel.path); };
   const auto found = std::ranges::lower_bound(channels, wanted, {}, placeOf);
   return found == channels.end() || placeOf(*found) != wanted ? nullptr : &*found;
-}
-
-// A spline may leave the range of its keys, and so the range of a float.
-float toFloat(double value) {
-  constexpr double largest = std::numeric_limits<float>::max();
-  return static_cast<float>(std::clamp(value, -largest, largest));
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ MeshView positionsOf(const Primitive& primitive) {
   return view;
 }
 
-SharedArray<float> valueOf(Result<std::vector<float>> normals) {
+SharedArray<float> shared(Result<std::vector<float>> normals) {
   if (!normals) throw Failure{std::move(normals).error()};
   return *std::move(normals);
 }
@@ -126,10 +126,9 @@ void addNormals(Source& source, MissingNormals kind, const std::string& where,
   source.spend(primitive.triangles.size(), 12, where);
   if (kind == MissingNormals::smooth) {
     source.spend(primitive.vertexCount, 36, where);
-    primitive.normals =
-        valueOf(smoothNormals(positionsOf(primitive), primitive.triangles.values()));
+    primitive.normals = shared(smoothNormals(positionsOf(primitive), primitive.triangles.values()));
   } else {
-    primitive.normals = valueOf(flatNormals(positionsOf(primitive), primitive.triangles.values()));
+    primitive.normals = shared(flatNormals(positionsOf(primitive), primitive.triangles.values()));
     unweld(source, where, primitive);
   }
 }

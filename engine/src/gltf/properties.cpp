@@ -25,6 +25,11 @@ void finiteNumber(const json& value, const char* property, const std::string& wh
 
 }  // namespace
 
+float toFloat(double number) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(number, -largest, largest));
+}
+
 const json& require(const json& object, const char* property, const std::string& where) {
   const auto found = object.find(property);
   if (found == object.end()) failInvalid(where, ": it has no ", property);

@@ -22,6 +22,9 @@ json& requireObject(json& object, const char* property, const std::string& where
 json& requireArray(json& object, const char* property, const std::string& where);
 std::uint64_t requireInteger(json& object, const char* property, const std::string& where);
 
+/// The nearest finite number: splines may leave the range of their keys, and so that of a float.
+float toFloat(double number);
+
 /// An integer of at least 0. JSON has no integers: 3.0 counts as one, and is replaced by it.
 std::uint64_t integer(json& value, const std::string& what);
 /// The same of a property, or `absent` if there is none.

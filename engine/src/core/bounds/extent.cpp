@@ -92,7 +92,7 @@ Extent Reach::extent() const {
   return extent;
 }
 
-Range imageOf(const Affine& map, const Extent& extent) {
+Range imageOf(const AffineMap& map, const Extent& extent) {
   Range image;
   for (std::size_t row = 0; row < 3; ++row) {
     const Interval interval =

@@ -74,22 +74,22 @@ inline Range rangeOf(const Box& box) {
 }
 
 /// An affine map x → linear x + offset.
-struct Affine {
+struct AffineMap {
   math::Mat3 linear;
   math::Vec3 offset;
 };
 
-inline Affine operator+(const Affine& a, const Affine& b) {
+inline AffineMap operator+(const AffineMap& a, const AffineMap& b) {
   return {a.linear + b.linear, a.offset + b.offset};
 }
-inline Affine operator-(const Affine& a, const Affine& b) {
+inline AffineMap operator-(const AffineMap& a, const AffineMap& b) {
   return {a.linear - b.linear, a.offset - b.offset};
 }
-inline Affine operator*(double factor, const Affine& a) {
+inline AffineMap operator*(double factor, const AffineMap& a) {
   return {factor * a.linear, factor * a.offset};
 }
 /// x → a(x) × v
-inline Affine cross(const Affine& a, const math::Vec3& v) {
+inline AffineMap cross(const AffineMap& a, const math::Vec3& v) {
   return {{{math::cross(a.linear[0], v), math::cross(a.linear[1], v), math::cross(a.linear[2], v)}},
           math::cross(a.offset, v)};
 }
@@ -107,7 +107,7 @@ struct Reach {
 /// A range that contains the image of all points of an extent, which must not be empty. A row d of
 /// the map lies between three of the 26 directions, to a face, an edge and a corner of the cube: it
 /// is a sum of them with factors ≥ 0. So the same sum of their reaches bounds the reach along d.
-Range imageOf(const Affine& map, const Extent& extent);
+Range imageOf(const AffineMap& map, const Extent& extent);
 
 /// The box around an extent.
 Range rangeOf(const Extent& extent);

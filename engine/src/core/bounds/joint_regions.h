@@ -12,8 +12,8 @@ namespace dermis::bounds {
 
 /// The matrix C = R S of a joint is any that fits these numbers.
 struct JointRegion {
-  Affine map;   ///< the center: |C p − map p| ≤ shift + turn |bind p| + slack |p|
-  Affine bind;  ///< from bind space to the frame of the joint
+  AffineMap map;   ///< the center: |C p − map p| ≤ shift + turn |bind p| + slack |p|
+  AffineMap bind;  ///< from bind space to the frame of the joint
   double shift = 0, turn = 0, slack = 0;
   double spread = 0;           ///< ‖C − map‖ of the linear parts
   double least = 1, most = 1;  ///< of the singular values of C; `least` is 0 if C may mirror

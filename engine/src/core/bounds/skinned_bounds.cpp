@@ -168,7 +168,7 @@ Parts partsOfRotation(const Parts& parts) {
 namespace dermis {
 namespace {
 
-using bounds::Affine;
+using bounds::AffineMap;
 using bounds::Chord;
 using bounds::JointRegion;
 using bounds::JointRegions;
@@ -186,7 +186,7 @@ struct Uncertainty {
 
 /// A joint in the pose: v = C p, and for dual quaternions C = R S.
 struct Posed {
-  Affine map;
+  AffineMap map;
   Parts parts;
   const Uncertainty* uncertainty = nullptr;  ///< null: the matrix is exactly known
   /// The two smallest |q · q'| with joints that share vertices of more than `maxTrioInfluences`
@@ -214,8 +214,8 @@ double offsetError(const Posed& joint) {
   return region.shift + region.turn * math::length(region.bind.offset);
 }
 
-Affine affineOf(const JointMatrix& matrix) {
-  Affine map;
+AffineMap affineOf(const JointMatrix& matrix) {
+  AffineMap map;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       map.linear[column][row] = static_cast<double>(matrix.m[row][column]);
@@ -251,7 +251,7 @@ constexpr double ambiguousCosine = 2e-5;
 /// Whether sums and products of a region's numbers stay finite.
 bool isBounded(const JointRegion& region) {
   double sum = region.shift + region.turn + region.slack + region.spread + region.most;
-  for (const Affine* map : {&region.map, &region.bind}) {
+  for (const AffineMap* map : {&region.map, &region.bind}) {
     for (int axis = 0; axis < 3; ++axis) sum += math::length(map->linear[axis]);
     sum += math::length(map->offset);
   }
@@ -489,7 +489,8 @@ class PoseBounds {
 
   void addLinearPair(const JointBoundsData::Pair& pair) {
     if (joints_[pair.first].parts.ambiguous || joints_[pair.second].parts.ambiguous) return;
-    const Affine &second = joints_[pair.second].map, difference = joints_[pair.first].map - second;
+    const AffineMap &second = joints_[pair.second].map,
+                    difference = joints_[pair.first].map - second;
     const Share share = shareOf(pair, 1);
     const double firstError = errorOf(joints_[pair.first], pair.extent);
     const double secondError = errorOf(joints_[pair.second], pair.extent);
@@ -503,7 +504,7 @@ class PoseBounds {
     const Posed &first = joints_[pair.first], &second = joints_[pair.second];
     if (first.parts.ambiguous || second.parts.ambiguous) return;
     const Turn turn = turnBetween(first, second);
-    const Affine difference = first.map - second.map;
+    const AffineMap difference = first.map - second.map;
     const double stretch = stretchBetween(first, second, pair.extent);
 
     // In a region the cosine may be this small, or as much larger.
@@ -511,7 +512,7 @@ class PoseBounds {
     const double cosine = std::max(0.0, turn.cosine - error);
     const double bulging = 1 / (static_cast<double>(pair.minSum) + 2 * cosine);
     const Bulge bulge = bulgeOf(first, second, turn, cosine, pair.extent);
-    const Affine bulged = bulging * bulge.map;
+    const AffineMap bulged = bulging * bulge.map;
     amplification_ = std::max(amplification_, 2 * bulging);
 
     Range range;
@@ -520,7 +521,7 @@ class PoseBounds {
     const Share share = shareOf(pair, cosine), other = shareOf(pair, turn.cosine + error);
     for (const double part :
          {std::min(share.least, other.least), std::max(share.greatest, other.greatest)}) {
-      const Affine chord = second.map + part * difference;
+      const AffineMap chord = second.map + part * difference;
       const double chordError = part * firstError + (1 - part) * secondError;
       range.add(bounds::imageOf(chord, pair.extent).grownBy(chordError));
       range.add(bounds::imageOf(chord + bulged, pair.extent).grownBy(chordError));
@@ -543,14 +544,14 @@ class PoseBounds {
 
   /// D = (v − v') × vec (q q'*) is within `error` of `map`, and |v − v'| is at most `chord`.
   struct Bulge {
-    Affine map;
+    AffineMap map;
     double error = 0, chord = 0;
   };
   Bulge bulgeOf(const Posed& first, const Posed& second, const Turn& turn, double cosine,
                 const Extent& extent) const {
-    const Affine difference = first.map - second.map;
+    const AffineMap difference = first.map - second.map;
     const double distance = bounds::reachOf(bounds::imageOf(difference, extent));
-    const Affine map = bounds::cross(difference, turn.axis);
+    const AffineMap map = bounds::cross(difference, turn.axis);
     if (regions_ == nullptr) return {map, 0, distance};
     const Uncertainty &a = *first.uncertainty, &b = *second.uncertainty;
     Chord chord = regions_->chord(a.joint, b.joint, extent);
@@ -569,7 +570,7 @@ class PoseBounds {
     const double error =
         first.uncertainty == nullptr ? 0 : first.uncertainty->stretch + second.uncertainty->stretch;
     if (first.parts.rigid && second.parts.rigid && error == 0) return 0;
-    const Affine difference{first.parts.scaleShear - second.parts.scaleShear, {}};
+    const AffineMap difference{first.parts.scaleShear - second.parts.scaleShear, {}};
     const double most = bounds::reachOf(bounds::imageOf(difference, extent));
     return error == 0 ? most : most + error * bounds::reachOf(bounds::rangeOf(extent));
   }

@@ -36,7 +36,7 @@ constexpr std::uint64_t wordsOf(std::uint64_t joints, std::uint64_t pairs, std::
          pairs * sizeof(JointBoundsData::Pair) / 4 + trios * 3;
 }
 
-Error damaged(const std::string& what) {
+Error damagedBounds(const std::string& what) {
   return {ErrorCode::invalidData, "joint bounds: " + what};
 }
 
@@ -64,12 +64,12 @@ Result<void> checkJoints(const JointBoundsData& bounds) {
   std::uint32_t required = 0;
   for (const JointBoundsData::Joint& joint : bounds.joints) {
     if (joint.joint < required || joint.joint >= maxPoseJoints || hasNan(joint.alone.reach))
-      return damaged("its joints are not in ascending order, or contain NaN");
+      return damagedBounds("its joints are not in ascending order, or contain NaN");
     required = joint.joint + 1;
   }
   if (required != bounds.requiredJoints) {
-    return damaged("requiredJoints is " + std::to_string(bounds.requiredJoints) + ", not " +
-                   std::to_string(required));
+    return damagedBounds("requiredJoints is " + std::to_string(bounds.requiredJoints) + ", not " +
+                         std::to_string(required));
   }
   return {};
 }
@@ -83,7 +83,7 @@ Result<void> checkPairs(const JointBoundsData& bounds) {
     if (pair.first >= pair.second || pair.second >= bounds.joints.size() || key < next ||
         pair.influences < 2 || hasNan(pair.extent.reach) || hasNan(ratios) ||
         std::ranges::any_of(ratios, [](float ratio) { return ratio < 0; }))
-      return damaged(
+      return damagedBounds(
           "its pairs of joints are not in ascending order, or contain values that are not valid");
     next = key + 1;
   }
@@ -95,7 +95,7 @@ Result<void> checkTrios(const JointBoundsData& bounds) {
   for (const std::array<std::uint32_t, 3>& trio : bounds.trios) {
     if (trio[0] >= trio[1] || trio[1] >= trio[2] || trio[2] >= bounds.joints.size() ||
         (before != nullptr && !(*before < trio)))
-      return damaged("its trios of joints are not in ascending order");
+      return damagedBounds("its trios of joints are not in ascending order");
     before = &trio;
   }
   return {};
@@ -132,7 +132,7 @@ Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> by
   Header header{};
   if (bytes.size() >= sizeof(header)) std::memcpy(&header, bytes.data(), sizeof(header));
   if (header.magic != magic)
-    return damaged("the bytes do not begin with the header of joint bounds");
+    return damagedBounds("the bytes do not begin with the header of joint bounds");
   if (header.version != version) {
     return Error{ErrorCode::unsupportedVersion,
                  "joint bounds: version " + std::to_string(header.version) +
@@ -140,12 +140,12 @@ Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> by
   }
   if (std::uint64_t{header.wordCount} * 4 != bytes.size() ||
       wordsOf(header.joints, header.pairs, header.trios) != header.wordCount) {
-    return damaged("they have " + std::to_string(bytes.size()) +
-                   " bytes, but their header does not describe as many");
+    return damagedBounds("they have " + std::to_string(bytes.size()) +
+                         " bytes, but their header does not describe as many");
   }
   std::vector<std::uint32_t> words(header.wordCount);
   std::memcpy(words.data(), bytes.data(), bytes.size());
-  if (checksumOfBlob(words) != header.checksum) return damaged("the checksum does not match");
+  if (checksumOfBlob(words) != header.checksum) return damagedBounds("the checksum does not match");
 
   JointBoundsData bounds;
   bytes = bytes.subspan(sizeof(header));
@@ -155,7 +155,7 @@ Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> by
   bounds.unweighted = header.unweighted;
   bounds.requiredJoints = header.requiredJoints;
   if (hasNan(bounds.unweighted.min) || hasNan(bounds.unweighted.max))
-    return damaged("the box of vertices without weight contains NaN");
+    return damagedBounds("the box of vertices without weight contains NaN");
   if (Result<void> good = checkJoints(bounds); !good) return good.error();
   if (Result<void> good = checkPairs(bounds); !good) return good.error();
   if (Result<void> good = checkTrios(bounds); !good) return good.error();

@@ -12,7 +12,7 @@
 namespace dermis {
 namespace {
 
-Error damaged(const std::string& what) {
+Error damagedBank(const std::string& what) {
   return {ErrorCode::invalidData, "packed clips: " + what};
 }
 
@@ -29,15 +29,15 @@ class BankCheck {
         !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
         header.clipCount > maxClips || header.maskCount > maxMasks || header.nodes % 4 != 0 ||
         header.clips % 4 != 0)
-      return damaged("its header does not fit its sections");
+      return damagedBank("its header does not fit its sections");
     for (std::size_t i = 0; i < nodes; ++i) {
-      if (!isNode(i)) return damaged("node " + std::to_string(i) + " is not valid");
+      if (!isNode(i)) return damagedBank("node " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.skinCount; ++i) {
-      if (!isSkin(bank_.skin(i))) return damaged("skin " + std::to_string(i) + " is not valid");
+      if (!isSkin(bank_.skin(i))) return damagedBank("skin " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.clipCount; ++i) {
-      if (!isClip(bank_.clip(i))) return damaged("clip " + std::to_string(i) + " is not valid");
+      if (!isClip(bank_.clip(i))) return damagedBank("clip " + std::to_string(i) + " is not valid");
     }
     return {};
   }
@@ -126,7 +126,7 @@ class BankCheck {
 
 Result<void> checkClips(std::span<const std::uint32_t> words) {
   if (words.size() < sizeof(BankHeader) / 4 || words[0] != clipsMagic)
-    return damaged("the bytes do not begin with the header of packed clips");
+    return damagedBank("the bytes do not begin with the header of packed clips");
   const BankHeader header = ClipBank(words).header;
   if (header.version != clipsVersion) {
     return Error{ErrorCode::unsupportedVersion,
@@ -134,11 +134,11 @@ Result<void> checkClips(std::span<const std::uint32_t> words) {
                      ", but this library reads version " + std::to_string(clipsVersion)};
   }
   if (header.wordCount != words.size()) {
-    return damaged("they have " + std::to_string(words.size() * 4) +
-                   " bytes, but their header says " +
-                   std::to_string(std::uint64_t{header.wordCount} * 4));
+    return damagedBank("they have " + std::to_string(words.size() * 4) +
+                       " bytes, but their header says " +
+                       std::to_string(std::uint64_t{header.wordCount} * 4));
   }
-  if (checksumOfBlob(words) != header.checksum) return damaged("the checksum does not match");
+  if (checksumOfBlob(words) != header.checksum) return damagedBank("the checksum does not match");
   return BankCheck(words).run();
 }
 
@@ -148,7 +148,7 @@ Result<PackedClips> PackedClips::fromBytes(std::span<const std::byte> bytes) {
   if (!clips.words_.empty())
     std::memcpy(clips.words_.data(), bytes.data(), clips.words_.size() * 4);
   if (bytes.size() % 4 != 0)
-    return damaged("they have " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
+    return damagedBank("they have " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
   if (Result<void> good = checkClips(clips.words_); !good) return good.error();
   return clips;
 }

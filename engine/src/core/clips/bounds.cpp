@@ -22,7 +22,7 @@
 namespace dermis {
 namespace {
 
-using bounds::Affine;
+using bounds::AffineMap;
 using bounds::Chord;
 using bounds::infinity;
 using bounds::JointRegion;
@@ -54,13 +54,13 @@ double arcBetween(const Vec4& a, const Vec4& b) {
   return 2 * std::asin(std::min(1.0, 0.5 * std::sqrt(math::dot(d, d))));
 }
 
-Affine multiply(const Affine& a, const Affine& b) {
+AffineMap multiply(const AffineMap& a, const AffineMap& b) {
   return {a.linear * b.linear, a.linear * b.offset + a.offset};
 }
 
-Affine affineAt(const ClipBank& bank, std::size_t offset) {
-  const auto rows = bank.at<dermis::Affine<float>>(offset);
-  Affine result;
+AffineMap affineAt(const ClipBank& bank, std::size_t offset) {
+  const auto rows = bank.at<Affine<float>>(offset);
+  AffineMap result;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column)
       result.linear[column][row] = double{rows[row][column]};
@@ -138,7 +138,7 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
 /// A node's matrix relative to its parent. Its linear part is within `spread` of the center's, and
 /// its translation within `shift`.
 struct LocalRegion {
-  Affine center;
+  AffineMap center;
   double shift = 0, spread = 0;
   double size = 0;   ///< of the translation: no sum that leads to it is larger
   Stretch stretch;   ///< of the linear part
@@ -153,7 +153,7 @@ double similarityError(const Stretch& stretch) {
   return ratio < 1e-3 ? 16 * ratio : infinity;
 }
 
-Vec4 rotationOf(const Affine& map, const Stretch& stretch) {
+Vec4 rotationOf(const AffineMap& map, const Stretch& stretch) {
   return similarityError(stretch) < infinity ? math::quaternionOf(map.linear / stretch.high)
                                              : Vec4{0, 0, 0, 1};
 }
@@ -229,7 +229,7 @@ LocalRegion regionOf(const Values& values) {
 /// the nodes, which moves a point x to at most `shift` + `turn` |x| from where `map` does. Products
 /// of float32 add `noiseShift` + `noiseTurn` |x|.
 struct Chain {
-  Affine map;
+  AffineMap map;
   double shift = 0, turn = 0, noiseShift = 0, noiseTurn = 0;
   Stretch stretch;
   Vec4 rotation{0, 0, 0, 1};
@@ -270,7 +270,7 @@ class ClipRegions final : public bounds::JointRegions {
     for (std::size_t joint = 0; joint < skin_.jointCount; ++joint) {
       const std::size_t matrix = skin_.matrices + 12 * joint;
       binds_.push_back(affineAt(bank, matrix));
-      stretches_.push_back(stretchOf(bank.at<dermis::Affine<float>>(matrix)));
+      stretches_.push_back(stretchOf(bank.at<Affine<float>>(matrix)));
       for (std::uint32_t node = nodeOf(joint); node != noNode; node = bank.node(node).parent)
         isNeeded_[node] = true;
     }
@@ -308,11 +308,11 @@ class ClipRegions final : public bounds::JointRegions {
                joints[joint].slack * bounds::reachOf(bounds::rangeOf(extent));
       return multiply(chain.map, binds_[joint]);
     };
-    const Affine between = place(first) - place(second);
+    const AffineMap between = place(first) - place(second);
     const double distance = bounds::reachOf(bounds::imageOf(between, extent));
     // The centers of whole chains may be others.
-    const Affine expected{top.map.linear * between.linear, top.map.linear * between.offset};
-    const Affine other = joints[first].map - joints[second].map - expected;
+    const AffineMap expected{top.map.linear * between.linear, top.map.linear * between.offset};
+    const AffineMap other = joints[first].map - joints[second].map - expected;
     return {top.stretch.high * (distance + error) + noise,
             top.turn * distance + top.stretch.high * error + noise +
                 bounds::reachOf(bounds::imageOf(other, extent))};
@@ -375,8 +375,8 @@ class ClipRegions final : public bounds::JointRegions {
   }
 
   void putBelowFixed(std::size_t matrix, LocalRegion& local) const {
-    const Affine fixed = affineAt(bank_, matrix);
-    const Stretch stretch = stretchOf(bank_.at<dermis::Affine<float>>(matrix));
+    const AffineMap fixed = affineAt(bank_, matrix);
+    const Stretch stretch = stretchOf(bank_.at<Affine<float>>(matrix));
     local.center = multiply(fixed, local.center);
     local.shift *= stretch.high;
     local.spread *= stretch.high;
@@ -387,7 +387,7 @@ class ClipRegions final : public bounds::JointRegions {
   }
 
   void setJoint(std::size_t joint) {
-    const Affine& bind = binds_[joint];
+    const AffineMap& bind = binds_[joint];
     const Stretch& stretch = stretches_[joint];
     JointRegion& region = joints[joint];
     region.bind = bind;
@@ -415,7 +415,7 @@ class ClipRegions final : public bounds::JointRegions {
   std::vector<bool> isNeeded_;  ///< whether a joint hangs on a node
   std::vector<LocalRegion> locals_;
   std::vector<Chain> chains_;
-  std::vector<Affine> binds_;
+  std::vector<AffineMap> binds_;
   std::vector<Stretch> stretches_;  ///< of `binds_`
 };
 

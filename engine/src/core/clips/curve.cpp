@@ -8,29 +8,25 @@
 namespace dermis {
 namespace {
 
-double dot(const Value& a, const Value& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-}
-
 Value mix(const Value& a, double share, const Value& b, double other) {
   Value result;
   for (std::size_t i = 0; i < 4; ++i) result[i] = share * a[i] + other * b[i];
   return result;
 }
 
-// The place of each part of a key of a spline.
-enum class Part : std::size_t { inTangent, value, outTangent };
-
-Value part(const ChannelView& channel, std::size_t key, Part part) {
+Value valueOf(const ChannelView& channel, std::size_t key, KeyPart part = KeyPart::value) {
   const std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
-  const bool isSpline = channel.interpolation == Interpolation::cubicSpline;
-  const std::size_t first = width * (isSpline ? 3 * key + static_cast<std::size_t>(part) : key);
+  const float* numbers = keyPart(channel, width, key, part);
   Value value{};
-  for (std::size_t i = 0; i < width; ++i) value[i] = double{channel.values[first + i]};
+  for (std::size_t i = 0; i < width; ++i) value[i] = double{numbers[i]};
   return value;
 }
 
 }  // namespace
+
+double dot(const Value& a, const Value& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
 
 Value normalized(Value quaternion) {
   normalizeQuaternion(quaternion);
@@ -116,18 +112,17 @@ std::optional<double> Curve::curvature(double from, double to) const {
     if (length <= 0) continue;
     if (isRotation()) {
       // On a great circle: the square of the speed of the quaternion, half of the angle's.
-      const double speed = distance(normalized(part(*channel_, key, Part::value)),
-                                    normalized(part(*channel_, key + 1, Part::value)), true) /
+      const double speed = distance(normalized(valueOf(*channel_, key)),
+                                    normalized(valueOf(*channel_, key + 1)), true) /
                            (2 * length);
       worst = std::max(worst, speed * speed);
       continue;
     }
     // The second derivative of the polynomial (glTF 2.0, appendix C.5) is linear, so it is largest
     // at an end: 6 (to − from) − length (4 leaving + 2 arriving), all over length², and the other.
-    const Value step =
-        mix(part(*channel_, key + 1, Part::value), 1, part(*channel_, key, Part::value), -1);
-    const Value leaving = part(*channel_, key, Part::outTangent);
-    const Value arriving = part(*channel_, key + 1, Part::inTangent);
+    const Value step = mix(valueOf(*channel_, key + 1), 1, valueOf(*channel_, key), -1);
+    const Value leaving = valueOf(*channel_, key, KeyPart::outTangent);
+    const Value arriving = valueOf(*channel_, key + 1, KeyPart::inTangent);
     for (const double end : {1.0, -1.0}) {
       const Value slopes = mix(leaving, -3 - end, arriving, -3 + end);
       const Value second = mix(step, 6, slopes, length);

@@ -43,6 +43,7 @@ class Curve {
 
 /// The angle between two rotations of unit length in radians, or the distance of two vectors.
 double distance(const Value& a, const Value& b, bool isRotation);
+double dot(const Value& a, const Value& b);
 Value normalized(Value quaternion);
 /// a · b of quaternions.
 Value product(const Value& a, const Value& b);

@@ -10,15 +10,6 @@
 namespace dermis {
 namespace {
 
-// The place of each part of a key in `ChannelView::values`.
-enum class Part : std::size_t { inTangent, value, outTangent };
-
-// `width`: numbers of a value.
-const float* keyPart(const ChannelView& channel, std::size_t width, std::size_t key, Part part) {
-  if (channel.interpolation != Interpolation::cubicSpline) return &channel.values[key * width];
-  return &channel.values[(3 * key + static_cast<std::size_t>(part)) * width];
-}
-
 // glTF 2.0, appendix C.4: interpolates along the shorter arc. Linear if the two are so close that
 // the angle is lost in rounding.
 void slerp(const float* from, const float* to, double fraction, std::span<double> value) {
@@ -42,10 +33,10 @@ void slerp(const float* from, const float* to, double fraction, std::span<double
 // glTF 2.0, appendix C.5: a Hermite spline whose tangents are scaled by the time between the keys.
 void cubicSpline(const ChannelView& channel, std::size_t key, double distance, double t,
                  std::span<double> value) {
-  const float* from = keyPart(channel, value.size(), key, Part::value);
-  const float* leaving = keyPart(channel, value.size(), key, Part::outTangent);
-  const float* arriving = keyPart(channel, value.size(), key + 1, Part::inTangent);
-  const float* to = keyPart(channel, value.size(), key + 1, Part::value);
+  const float* from = keyPart(channel, value.size(), key, KeyPart::value);
+  const float* leaving = keyPart(channel, value.size(), key, KeyPart::outTangent);
+  const float* arriving = keyPart(channel, value.size(), key + 1, KeyPart::inTangent);
+  const float* to = keyPart(channel, value.size(), key + 1, KeyPart::value);
   const double t2 = t * t;
   const double t3 = t2 * t;
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -58,8 +49,8 @@ void cubicSpline(const ChannelView& channel, std::size_t key, double distance, d
 void between(const ChannelView& channel, std::size_t key, double time, std::span<double> value) {
   const double distance = double{channel.times[key + 1]} - double{channel.times[key]};
   const double fraction = (time - double{channel.times[key]}) / distance;
-  const float* from = keyPart(channel, value.size(), key, Part::value);
-  const float* to = keyPart(channel, value.size(), key + 1, Part::value);
+  const float* from = keyPart(channel, value.size(), key, KeyPart::value);
+  const float* to = keyPart(channel, value.size(), key + 1, KeyPart::value);
   if (channel.interpolation == Interpolation::cubicSpline) {
     cubicSpline(channel, key, distance, fraction, value);
   } else if (channel.path == ChannelPath::rotation) {
@@ -72,6 +63,11 @@ void between(const ChannelView& channel, std::size_t key, double time, std::span
 }
 
 }  // namespace
+
+const float* keyPart(const ChannelView& channel, std::size_t width, std::size_t key, KeyPart part) {
+  if (channel.interpolation != Interpolation::cubicSpline) return &channel.values[key * width];
+  return &channel.values[(3 * key + static_cast<std::size_t>(part)) * width];
+}
 
 double normalizeQuaternion(std::span<double, 4> quaternion) {
   double square = 0;
@@ -96,7 +92,7 @@ void interpolate(const ChannelView& channel, double time, std::span<double> valu
                     channel.interpolation == Interpolation::step ||
                     time == double{channel.times[key]};
   if (hold) {
-    std::copy_n(keyPart(channel, value.size(), key, Part::value), value.size(), value.begin());
+    std::copy_n(keyPart(channel, value.size(), key, KeyPart::value), value.size(), value.begin());
   } else {
     between(channel, key, time, value);
   }

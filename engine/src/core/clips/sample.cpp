@@ -18,7 +18,7 @@ namespace {
 
 using Float4 = std::array<float, 4>;
 
-struct Local {
+struct LocalTransform {
   Float4 translation, rotation, scale;
 };
 
@@ -94,7 +94,8 @@ Float4 sampleTrack(const ClipBank& bank, const Layer& layer, std::size_t node, C
   return sampleKeys(bank, layer, word);
 }
 
-Local sampleLocal(const ClipBank& bank, const Layer& layer, std::size_t node, const Local& rest) {
+LocalTransform sampleLocal(const ClipBank& bank, const Layer& layer, std::size_t node,
+                           const LocalTransform& rest) {
   return {sampleTrack(bank, layer, node, ChannelPath::translation, rest.translation),
           sampleTrack(bank, layer, node, ChannelPath::rotation, rest.rotation),
           sampleTrack(bank, layer, node, ChannelPath::scale, rest.scale)};
@@ -105,14 +106,14 @@ bool isAdditive(const Layer& layer) {
 }
 
 /// The weighted mean of the layers that are not additive.
-Local blend(const ClipBank& bank, std::span<const Layer> layers, std::size_t node,
-            const Local& rest) {
+LocalTransform blend(const ClipBank& bank, std::span<const Layer> layers, std::size_t node,
+                     const LocalTransform& rest) {
   float sum = 0;
   for (const Layer& layer : layers) {
     if (!isAdditive(layer)) sum = sum + layer.weight * bank.mask(layer.mask, node);
   }
   if (!(sum > 0)) return rest;
-  Local result{};
+  LocalTransform result{};
   Float4 first{};
   bool isFirst = true;
   for (const Layer& layer : layers) {
@@ -120,7 +121,7 @@ Local blend(const ClipBank& bank, std::span<const Layer> layers, std::size_t nod
     const float weight = layer.weight * bank.mask(layer.mask, node);
     if (!(weight > 0)) continue;
     const float share = weight / sum;
-    const Local local = sampleLocal(bank, layer, node, rest);
+    const LocalTransform local = sampleLocal(bank, layer, node, rest);
     if (isFirst) first = local.rotation;
     isFirst = false;
     result.translation = mix(result.translation, 1, local.translation, share);
@@ -132,9 +133,9 @@ Local blend(const ClipBank& bank, std::span<const Layer> layers, std::size_t nod
   return result;
 }
 
-constexpr Local noDifference{{0, 0, 0, 0}, {0, 0, 0, 1}, {1, 1, 1, 0}};
+constexpr LocalTransform noLocalDifference{{0, 0, 0, 0}, {0, 0, 0, 1}, {1, 1, 1, 0}};
 
-void add(Local& local, const Local& difference, float weight) {
+void add(LocalTransform& local, const LocalTransform& difference, float weight) {
   Float4 turn = difference.rotation;
   if (turn[3] < 0) turn = mix(turn, -1, {}, 0);
   turn = normalized(mix({0, 0, 0, 1}, 1 - weight, turn, weight));
@@ -241,13 +242,14 @@ void sampleNodes(const PackedClips& clips, const PackedLayers& packed,
   const std::span<const Layer> layers = std::span(storage).first(packed.count);
   for (std::size_t i = 0; i < globals.size(); ++i) {
     const BankNode node = bank.node(i);
-    const Local rest{vectorFrom(node.translation),
-                     {node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]},
-                     vectorFrom(node.scale)};
-    Local local = blend(bank, layers, i, rest);
+    const LocalTransform rest{
+        vectorFrom(node.translation),
+        {node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]},
+        vectorFrom(node.scale)};
+    LocalTransform local = blend(bank, layers, i, rest);
     for (const Layer& layer : layers) {
       if (isAdditive(layer)) {
-        add(local, sampleLocal(bank, layer, i, noDifference),
+        add(local, sampleLocal(bank, layer, i, noLocalDifference),
             layer.weight * bank.mask(layer.mask, i));
       }
     }

@@ -9,9 +9,6 @@ namespace dermis {
 namespace {
 
 constexpr double unitRounding = 0x1p-24;
-double dot(const Value& a, const Value& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-}
 
 Value mixed(const Value& a, const Value& b, double fraction, bool isRotation) {
   const double other = isRotation && dot(a, b) < 0 ? -fraction : fraction;

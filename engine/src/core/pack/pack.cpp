@@ -16,10 +16,7 @@
 namespace dermis {
 namespace {
 
-/// Kernels read four words at a time.
-void alignToUnit(std::vector<std::uint32_t>& words) {
-  words.resize((words.size() + 3) / 4 * 4, 0u);
-}
+using abi::alignToUnit;
 
 /// A target's displacements, read by element.
 class Displacements {

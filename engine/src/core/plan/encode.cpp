@@ -25,11 +25,7 @@ std::uint32_t wordsOf(const std::vector<std::uint32_t>& tables) {
   return static_cast<std::uint32_t>(tables.size());
 }
 
-/// Records begin at multiples of four words.
-void alignToUnit(std::vector<std::uint32_t>& tables) {
-  tables.resize((tables.size() + 3) / 4 * 4);
-}
-
+using abi::alignToUnit;
 using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
