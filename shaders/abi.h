@@ -23,6 +23,7 @@ DERMIS_CONSTANT BINDING_MESHES = 1u;  // meshes and clips; palette kernel: the j
 // Palettes, written by the palette kernel and read by the skin kernel. For linear blending in a
 // batch, the joint matrices are bound here instead.
 DERMIS_CONSTANT BINDING_PALETTES = 2u;
+DERMIS_CONSTANT BINDING_WEIGHTS = 2u;    // of the kernel that lists morph targets
 DERMIS_CONSTANT BINDING_POSITIONS = 3u;  // compose kernel: the joint matrices
 DERMIS_CONSTANT MIN_BINDING_COUNT = 4u;
 DERMIS_CONSTANT BINDING_NORMALS = 4u;
@@ -305,6 +306,7 @@ struct ExtensionRecord {
   uint reserved2;
 };
 DERMIS_CONSTANT EXTENSION_WORDS = 12u;
+DERMIS_CONSTANT EXTENSION_MORPH_COUNT = 1u;  // the word of `morphCount`
 
 // An active morph target. The targets of an instance are sorted by `target`.
 struct ActiveMorph {
@@ -312,6 +314,16 @@ struct ActiveMorph {
   float weight;
 };
 DERMIS_CONSTANT ACTIVE_MORPH_WORDS = 2u;
+
+// An instance whose morph weights are written on the GPU, and the place where its active targets
+// are listed.
+struct MorphListRecord {
+  uint extension;    // word offset of its ExtensionRecord, whose `morphCount` is written
+  uint list;         // word offset of the list, which has room for all targets
+  uint weightCount;  // the number of targets
+  uint weights;      // word offset of the weights in their buffer, a float for each target
+};
+DERMIS_CONSTANT MORPH_LIST_WORDS = 4u;
 
 // The result of an instance: the bounds of its skinned positions, and the number of clamped
 // vertices. The same as InstanceResult. Minimum and maximum are integers that compare like the
@@ -394,6 +406,11 @@ struct ComposePush {
   uint figures;
   uint workgroupCount;
   uint band;
+};
+struct MorphListPush {
+  uint lists;  // word offset of the records
+  uint listCount;
+  uint workgroupCount;
 };
 struct ClearPush {
   uint results;  // word offset of the list of result indices

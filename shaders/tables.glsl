@@ -77,6 +77,11 @@ void storeInstance(uint word, InstanceRecord r) {
 void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(r.x, r.y, r.z, r.reserved); }
 #endif
 
+MorphListRecord loadMorphList(uint word) {
+  uvec4 a = tableUnit(word);
+  return MorphListRecord(a.x, a.y, a.z, a.w);
+}
+
 ActiveMorph loadActiveMorph(uint word) { return ActiveMorph(tables[word], uintBitsToFloat(tables[word + 1u])); }
 
 // The number of the workgroup. Dispatches with many workgroups use x and y.

@@ -165,6 +165,9 @@ TEST_F(CpuSceneTest, WhatIsTheGpusIsRefused) {
   description = descriptions_[0];
   description.method = Method::logMatrix;
   expectRefused(engine_->addInstance(description), "log_matrix");
+  description = descriptions_[0];
+  description.morphWriter = MorphWriter::gpu;
+  expectRefused(engine_->addInstance(description), "the CPU skins it");
   const InstanceChange wrong{.instance = instances_[0], .method = Method::sphericalBlend};
   expectRefused(engine_->change(wrong), "spherical_blend");
   // The one before it is made.

@@ -243,6 +243,7 @@ class ModelSteps {
     description.bounds = !hasGpu && description.layout.positions == VertexFormat::float32x3;
     description.culledOnGpu = hasGpu && chance(25);
     if (chance(30)) description.updateInterval = 2 + below(3);
+    if (hasGpu && chance(30)) description.morphWriter = MorphWriter::gpu;
     prepare(description);
     if (chance(30))
       tryToAdd([&] { return system().addInstance(description); },
@@ -254,6 +255,16 @@ class ModelSteps {
     }
     instance.handle = *added;
     model_->instances.push_back(instance);
+    if (description.morphWriter == MorphWriter::gpu) writeWeights(instance);
+  }
+  /// All weights, of which the instance's set names those that are not 0.
+  void writeWeights(const ModelInstance& instance) {
+    if constexpr (hasGpu) {
+      std::vector<float> weights(kinds_[kindOf_.at(instance.mesh)].info().morphTargetCount);
+      for (const MorphWeight& morph : morphSets[instance.morphs])
+        weights[morph.target] = morph.weight;
+      engine_->writeWeights(instance.handle, weights);
+    }
   }
   void removeInstance() {
     if (model_->instances.empty()) return;
@@ -273,6 +284,7 @@ class ModelSteps {
       case 2:
         instance.morphs = (instance.morphs + 1 + below(2)) % 3;
         instance.change();
+        if (instance.description.morphWriter == MorphWriter::gpu) return writeWeights(instance);
         return must(
             system().change({.instance = instance.handle, .morphs = morphSets[instance.morphs]}));
       case 3:
@@ -302,16 +314,24 @@ class ModelSteps {
     const auto mesh = anyMesh();
     if (mesh->first == instance.mesh) return;
     const std::uint32_t vertexCount = kinds_[mesh->second.kind].vertexCount();
+    const auto targetsOf = [&](std::uint32_t number) {
+      return kinds_[kindOf_.at(number)].info().morphTargetCount;
+    };
+    const bool hasOtherTargets = targetsOf(instance.mesh) != targetsOf(mesh->first);
+    if (hasOtherTargets && instance.description.morphWriter == MorphWriter::gpu) {
+      const Result<void> set =
+          system().change({.instance = instance.handle, .mesh = mesh->second.handle});
+      ASSERT_FALSE(set);
+      messages_.insert(set.error().message);
+      return;
+    }
     if (const Result<void> set =
             system().change({.instance = instance.handle, .mesh = mesh->second.handle});
         !set) {
       expectRoomIsMissing(set.error(), std::uint64_t{vertexCount} * 44);
       return;
     }
-    const auto targetsOf = [&](std::uint32_t number) {
-      return kinds_[kindOf_.at(number)].info().morphTargetCount;
-    };
-    if (targetsOf(instance.mesh) != targetsOf(mesh->first)) instance.morphs = 0;
+    if (hasOtherTargets) instance.morphs = 0;
     instance.mesh = mesh->first;
     instance.description.mesh = mesh->second.handle;
     prepare(instance.description);
@@ -347,7 +367,11 @@ class ModelSteps {
       }
       if (chance(30)) {
         instance.morphs = below(3);
-        change.morphs = morphSets[instance.morphs];
+        if (instance.description.morphWriter == MorphWriter::gpu) {
+          writeWeights(instance);
+        } else {
+          change.morphs = morphSets[instance.morphs];
+        }
         instance.change();
       }
       if (chance(20)) {

@@ -46,6 +46,7 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   add([&](InstanceDescription& wrong) { wrong.pose = objects.narrow; });
   add([](InstanceDescription& wrong) { wrong.updateInterval = 0; });
   add([](InstanceDescription& wrong) { wrong.method = static_cast<Method>(9); });
+  add([](InstanceDescription& wrong) { wrong.morphWriter = static_cast<MorphWriter>(9); });
   add([](InstanceDescription& wrong) { wrong.layout.positions = VertexFormat::none; });
   add([](InstanceDescription& wrong) { wrong.layout.tangents = VertexFormat::float16x3; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1}; });
@@ -93,6 +94,7 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   calls.push_back({[&system, removed] { return withoutValue(system.isDue(removed)); }});
   calls.push_back({[&system, removed] { return withoutValue(system.bounds(removed)); }});
   calls.push_back({[&system] { return withoutValue(system.writePose({})); }});
+  calls.push_back({[&system, removed] { return system.markMorphsWritten({&removed, 1}); }});
   const auto draw = [&](std::vector<InstanceHandle> instances, std::size_t ranges,
                         std::size_t draws) {
     calls.push_back({[&system, instances, ranges, draws] {

@@ -42,7 +42,8 @@ InstanceHandle SystemEngine::addInstance(const InstanceDescription& description)
 void SystemEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matrices) {
   if (recorder_.poseRange(pose).ok()) {
     std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return write.pose == pose; });
-    gpuWrites_.push_back({pose, {matrices.begin(), matrices.end()}});
+    const auto bytes = std::as_bytes(matrices);
+    gpuWrites_.push_back({pose, {}, {bytes.begin(), bytes.end()}});
     return;
   }
   const std::span<JointMatrix> mapped = must(scene().writePose(pose));
@@ -50,19 +51,28 @@ void SystemEngine::writePose(PoseHandle pose, std::span<const JointMatrix> matri
   std::ranges::copy(matrices, mapped.begin());
 }
 
+void SystemEngine::writeWeights(InstanceHandle instance, std::span<const float> weights) {
+  std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return write.instance == instance; });
+  const auto bytes = std::as_bytes(weights);
+  gpuWrites_.push_back({{}, instance, {bytes.begin(), bytes.end()}});
+}
+
 void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
-  std::erase_if(gpuWrites_,
-                [&](const GpuWrite& write) { return !recorder_.poseRange(write.pose).ok(); });
+  std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return !rangeOf(write).ok(); });
   if (gpuWrites_.empty()) return;
   if (recordsPoseBarriers)
     recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
   for (const GpuWrite& write : gpuWrites_) {
-    const vulkan::BufferRange range = must(recorder_.poseRange(write.pose));
-    const std::size_t size = write.matrices.size() * sizeof(JointMatrix);
+    const vulkan::BufferRange range = must(rangeOf(write));
+    const std::size_t size = write.bytes.size();
     if (range.size != size) throw std::runtime_error("the pose has another size");
     device_.functions().CmdUpdateBuffer(commandBuffer, range.buffer, range.offset, size,
-                                        write.matrices.data());
-    must(scene().markWritten({&write.pose, 1}));
+                                        write.bytes.data());
+    if (write.pose) {
+      must(scene().markWritten({&write.pose, 1}));
+    } else {
+      must(scene().markMorphsWritten({&write.instance, 1}));
+    }
   }
   if (recordsPoseBarriers)
     recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::dermis));

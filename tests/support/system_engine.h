@@ -47,6 +47,8 @@ class SystemEngine {
   /// A pose that the GPU writes is written by a command before `record`, and marked; again if the
   /// frame is abandoned.
   void writePose(PoseHandle pose, std::span<const JointMatrix> matrices);
+  /// The same for the morph weights of an instance that the GPU writes.
+  void writeWeights(InstanceHandle instance, std::span<const float> weights);
 
   // -- Frames.
   /// Begins the next one, once at most `underWay` of those before are not complete.
@@ -117,9 +119,13 @@ class SystemEngine {
   std::deque<SubmittedFrame> submitted_;
   std::vector<VkCommandBuffer> secondaries_;
   struct GpuWrite {
-    PoseHandle pose;
-    std::vector<JointMatrix> matrices;
+    PoseHandle pose;          ///< or …
+    InstanceHandle instance;  ///< … whose morph weights are written
+    std::vector<std::byte> bytes;
   };
+  Result<vulkan::BufferRange> rangeOf(const GpuWrite& write) const {
+    return write.pose ? recorder_.poseRange(write.pose) : recorder_.weightsRange(write.instance);
+  }
   std::vector<GpuWrite> gpuWrites_;  ///< not submitted yet
   std::uint64_t frame_ = 0, completedFrame_ = 0;
   samples::MappedBuffer readBack_;

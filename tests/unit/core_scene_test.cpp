@@ -111,10 +111,11 @@ std::vector<std::string> namesOf(const PlannedScene& scene) {
     if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
       const Kernel kernel = variantOf(dispatch->pipeline).kernel;
       names.push_back(std::string(dispatch->indirectOffset ? "indirect " : "") +
-                      (kernel == Kernel::palette ? "palette"
-                       : kernel == Kernel::skin  ? "skin"
-                       : kernel == Kernel::clear ? "clear"
-                                                 : "visibility"));
+                      (kernel == Kernel::palette      ? "palette"
+                       : kernel == Kernel::skin       ? "skin"
+                       : kernel == Kernel::clear      ? "clear"
+                       : kernel == Kernel::morphLists ? "morph lists"
+                                                      : "visibility"));
     } else if (const auto* upload = std::get_if<UploadCommand>(&command)) {
       names.push_back(std::string("upload to ") +
                       nameOfBuffer(upload->to.buffer, upload->to.offset));
@@ -660,6 +661,50 @@ TEST(Scene, AMeshWithOtherTargetsTakesNoMorphWeights) {
     must(one.scene.change({.instance = one.instance, .mesh = meshes[1]}));
     EXPECT_FALSE(isMorphed(frame + 2));
   }
+}
+
+TEST(Scene, TheGpuListsMorphTargetsBeforeItSkins) {
+  OneInstance one;
+  const auto expectRefused = [&](const char* text) {
+    const std::uint64_t used = one.scene.statistics().outputs.used;
+    const Result<InstanceHandle> added = one.scene.addInstance(one.description);
+    ASSERT_FALSE(added.ok()) << text;
+    EXPECT_NE(added.error().message.find(text), std::string::npos) << added.error().message;
+    EXPECT_EQ(one.scene.statistics().outputs.used, used) << text;
+  };
+  one.description.bounds = false;
+  one.description.morphWriter = MorphWriter::gpu;
+  expectRefused("its mesh has no targets");
+  MeshInfo info = one.info;
+  info.morphTargetCount = 30;
+  one.description.mesh = *one.owner.addMesh(info);
+  const InstanceHandle instance = must(one.scene.addInstance(one.description));
+  const BufferPart weights = must(one.owner.books().weightsPart(instance));
+  EXPECT_EQ(weights.size, 120u);
+  EXPECT_EQ(weights.offset % 16, 0u);
+  EXPECT_FALSE(one.owner.books().weightsPart(one.instance).ok());
+  one.plan(1, 0);
+  const std::vector<std::string> names = namesOf(one.owner);
+  const auto lists = std::ranges::find(names, "morph lists");
+  ASSERT_NE(lists, names.end());
+  EXPECT_EQ(lists[-1], "copy write before compute");
+  EXPECT_EQ(lists[1], "compute write before compute");
+  EXPECT_EQ(std::ranges::count(names.begin(), lists, "skin"), 0);
+  must(one.owner.commit());
+  // Only what was written is skinned again.
+  must(one.scene.beginFrame(2, 1));
+  must(one.scene.markMorphsWritten({&instance, 1}));
+  must(one.owner.plan());
+  must(one.owner.commit());
+  ASSERT_EQ(one.scene.skinnedInstances().size(), 1u);
+  EXPECT_EQ(one.scene.skinnedInstances()[0], instance);
+  EXPECT_FALSE(one.scene.markMorphsWritten({&instance, 1}).ok()) << "the frame was executed";
+  // Its place is free when the frame is complete.
+  must(one.scene.removeInstance(instance));
+  one.record(3, 2);
+  one.record(4, 3);
+  const InstanceHandle next = must(one.scene.addInstance(one.description));
+  EXPECT_EQ(must(one.owner.books().weightsPart(next)).offset, weights.offset);
 }
 
 TEST(Scene, WhatIsRemovedIsFreeWhenItsFrameIsComplete) {

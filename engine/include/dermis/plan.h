@@ -187,6 +187,7 @@ struct PipelineNeeds {
   bool bounds = false;       ///< `Job::bounds`
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
   bool figures = false;      ///< whether poses belong to figures (`Scene::addFigure`)
+  bool morphsOnGpu = false;  ///< whether morph weights have a `MorphWriter` other than the CPU
   // -- Optional. Each of these reduces the number of pipelines. Instances that differ from it are
   // then not prepared.
   /// What is true of all meshes: `maxInfluences` is the maximum, `minInfluences` the minimum, and
@@ -196,8 +197,8 @@ struct PipelineNeeds {
 };
 
 /// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
-/// `culledOnGpu` also the visibility kernel, and with `figures` the two that sample clips. Fails as
-/// `placeVertices` does, and with `invalidArgument` if the layout breaks a rule of
+/// `culledOnGpu` also the visibility kernel, with `figures` the two that sample clips, and with
+/// `morphsOnGpu` the one that lists morph targets. Fails as `placeVertices` does, and with `invalidArgument` if the layout breaks a rule of
 /// `OutputAttribute`, or if the method, the limits or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,

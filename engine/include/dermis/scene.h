@@ -71,7 +71,7 @@ struct SceneDescription {
   /// some joints of a buffer may stay unused.
   Capacity jointCapacity{256};
   /// The same for poses that the GPU writes. Poses of figures are among them, unless the CPU
-  /// executes the frames.
+  /// executes the frames, and morph weights that the GPU writes: 12 take the room of a joint.
   Capacity gpuJointCapacity{0};
   /// Bytes of skinned vertices: the sum of `VertexPlaces::size` and of the gaps for alignment. May
   /// be more than a storage buffer range. Initial and maximum are rounded to multiples of 4.
@@ -96,6 +96,14 @@ struct FigurePlay {
   FigureHandle figure = {};
   /// As `samplePose` takes them, at most `maxClipLayers`; copied. If there are none, it rests.
   std::span<const ClipLayer> layers = {};
+};
+
+/// Who writes the morph weights of an instance.
+enum class MorphWriter : std::uint8_t {
+  cpu = 0,  ///< `InstanceChange::morphs`
+  /// A GPU pass of the engine: a float for each morph target, always to the same memory. The engine
+  /// then calls `markMorphsWritten`. The GPU lists the targets whose weight is not 0.
+  gpu = 1,
 };
 
 /// One instance of a scene.
@@ -125,6 +133,8 @@ struct InstanceDescription {
   /// of a range always does. If a larger one does not, because the output buffer is larger than one
   /// range, `addInstance` and `change` fail with `limitExceeded`.
   bool culledOnGpu = false;
+  /// Other than the CPU needs a mesh with morph targets.
+  MorphWriter morphWriter = MorphWriter::cpu;
 };
 
 /// What changes about an instance: every member that has a value. If the mesh, pose, method or box
@@ -141,13 +151,13 @@ struct InstanceChange {
   std::optional<std::uint32_t> updateInterval = {};  ///< as `InstanceDescription::updateInterval`
   /// Another mesh, for example a level of detail. The output moves, and previous positions are set
   /// to the current ones. Morph weights are kept if both meshes have the same number of targets;
-  /// otherwise they are removed.
+  /// otherwise they are removed, or the change fails if the GPU writes them.
   std::optional<MeshHandle> mesh = {};
   std::optional<PoseHandle> pose = {};  ///< previous positions are kept
   /// For positions in snorm16. Previous positions are set to the current ones, since the old ones
   /// are relative to the old box.
   std::optional<Box> box = {};
-  /// The active targets, as `Job::morphs`. The weights are copied.
+  /// The active targets, as `Job::morphs`. The weights are copied. Fails if the GPU writes them.
   std::optional<std::span<const MorphWeight>> morphs = {};
 };
 
@@ -332,6 +342,8 @@ class DERMIS_CORE_API Scene {
   Result<void> markWritten(std::span<const PoseHandle> poses);
   /// `markWritten` for all poses that the engine's GPU passes write.
   Result<void> markAllWritten();
+  /// The same for morph weights (`MorphWriter::gpu`): these instances are skinned again.
+  Result<void> markMorphsWritten(std::span<const InstanceHandle> instances);
   /// Sets what figures play, at any time. All instances of their poses are skinned again. The next
   /// frames sample a pose once, when an instance is skinned with it: one that is invisible or not
   /// due costs nothing, and gets what its figure plays then. Times are wrapped or clamped here
@@ -519,6 +531,10 @@ class DERMIS_CORE_API SceneCommands {
   /// to a figure. The place stays the same until the pose is removed. Fails with `invalidArgument`
   /// for a pose that the CPU writes.
   Result<BufferPart> posePart(PoseHandle pose) const;
+  /// Where the morph weights of an instance are that a GPU pass of the engine writes: a float for
+  /// each target of its mesh. The place stays the same until the instance is removed. Fails with
+  /// `invalidArgument` for an instance whose weights the CPU writes.
+  Result<BufferPart> weightsPart(InstanceHandle instance) const;
 
  private:
   SceneCommands();

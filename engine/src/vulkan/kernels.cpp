@@ -109,6 +109,7 @@ std::string moduleName(const Variant& variant) {
     return variant.method == Method::logMatrix ? "palette_logarithms" : "palette";
   if (variant.kernel == Kernel::clear) return "clear";
   if (variant.kernel == Kernel::visibility) return "visibility";
+  if (variant.kernel == Kernel::morphLists) return "morph_lists";
   if (variant.kernel == Kernel::sample) return variant.texels ? "sample_texels" : "sample";
   if (variant.kernel == Kernel::compose) return variant.texels ? "compose_texels" : "compose";
   std::string name = "skin";
@@ -132,6 +133,7 @@ std::string pipelineName(const Variant& variant) {
                             : "");
   }
   if (variant.kernel == Kernel::clear) return "clear kernel";
+  if (variant.kernel == Kernel::morphLists) return "kernel that lists morph targets";
   if (variant.kernel == Kernel::sample) return "kernel that samples clips";
   if (variant.kernel == Kernel::compose) return "kernel that composes poses";
   if (variant.kernel == Kernel::visibility)

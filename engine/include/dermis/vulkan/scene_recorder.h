@@ -215,6 +215,11 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// and it calls `Scene::markWritten`. It only reads the poses of figures, after the commands of a
   /// frame: as they were last sampled. Fails with `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
+  /// The same for the morph weights of an instance (`MorphWriter::gpu`): a float for each target of
+  /// its mesh, in ascending order. The engine calls `Scene::markMorphsWritten`. The range stays the
+  /// same until the instance is removed; its offset is a multiple of 16. Fails with
+  /// `invalidArgument` for an instance whose weights the CPU writes.
+  Result<BufferRange> weightsRange(InstanceHandle instance) const;
 
   /// Of the last frame that was recorded.
   RecorderStatistics statistics() const;

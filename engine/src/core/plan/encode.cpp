@@ -62,12 +62,14 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   plan.limits = limits;
   plan.sizes = sizes;
   dispatches_.clear();
+  lists_.clear();
   if (work.isEmpty()) return {};
   if (Result<void> good = addFigureDispatches(); !good) return good;
   if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
   writeInstances();
+  if (Result<void> good = addMorphLists(); !good) return good;
   if (!work.culled.empty()) {
     appendCandidates();
     appendCulledDispatches();
@@ -77,7 +79,7 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
     return tooLargeForRange("tables", plan.tables.size() * 4, limits);
   plan.instanceCount = static_cast<std::uint32_t>(work.instances.size());
   // Commands point into the list, so it must not move.
-  plan.bindings.reserve((dispatches_.size() + visibility_.size()) *
+  plan.bindings.reserve((dispatches_.size() + lists_.size() + visibility_.size()) *
                         (abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT));
   return {};
 }
@@ -314,23 +316,17 @@ Result<void> Encoder::addDispatches() {
   return {};
 }
 
-/// Returns the word of the first. Needs no alignment.
-std::uint32_t Encoder::appendMorphs(std::span<const MorphWeight> morphs) {
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::uint32_t first = wordsOf(tables);
-  for (const MorphWeight& morph : morphs)
-    tables.insert(tables.end(), {morph.target, std::bit_cast<std::uint32_t>(morph.weight)});
-  return first;
-}
-
 std::uint32_t Encoder::appendExtension(const InstanceExtras& extras) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   alignToUnit(tables);
   const std::uint32_t place = wordsOf(tables);
   tables.resize(tables.size() + abi::EXTENSION_WORDS);
   abi::ExtensionRecord extension{};
-  extension.morphs = appendMorphs(extras.morphs);
+  extension.morphs = wordsOf(tables);  // needs no alignment
   extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
+  for (const MorphWeight& morph : extras.morphs)
+    tables.insert(tables.end(), {morph.target, std::bit_cast<std::uint32_t>(morph.weight)});
+  tables.resize(tables.size() + std::size_t{extras.writtenMorphs} * abi::ACTIVE_MORPH_WORDS);
   if (extras.result != notUsed) extension.result = extras.result;
   if (extras.hasBox) setBox(extension, extras.box);
   store(tables, place, extension);
@@ -343,7 +339,9 @@ void Encoder::writeInstances() {
   tables.resize(firstRecord + work_->instances.size() * abi::INSTANCE_WORDS);
   culledPlaces_.resize(work_->culled.size());
   filled_.assign(work_->groups.size(), 0);
+  listRecords_.clear();
   auto candidate = work_->culled.begin();
+  auto list = work_->morphLists.begin();
   for (std::uint32_t number = 0; number < work_->instances.size(); ++number) {
     const Work::Instance& instance = work_->instances[number];
     const std::uint32_t group = work_->groupOf(instance);
@@ -362,9 +360,41 @@ void Encoder::writeInstances() {
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
     if (candidate != work_->culled.end() && candidate->instance == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - work_->culled.begin())] = place;
+    if (list != work_->morphLists.end() && list->instance == number)
+      listRecords_.push_back({extension, extension + abi::EXTENSION_WORDS,
+                              instance.extras->writtenMorphs, (list++)->weights});
   }
   culled_.instances = firstRecord;
   markEvenlySpaced(firstRecord);
+}
+
+/// One invocation for each list; a dispatch for each buffer that has weights.
+Result<void> Encoder::addMorphLists() {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  const std::span<const Work::MorphList> lists = work_->morphLists;
+  std::uint32_t buffers = 0;
+  for (const Work::MorphList& list : lists) buffers = std::max(buffers, list.buffer + 1);
+  for (std::uint32_t buffer = 0; buffer < buffers; ++buffer) {
+    alignToUnit(tables);
+    const std::uint32_t first = wordsOf(tables);
+    for (std::size_t i = 0; i < lists.size(); ++i) {
+      if (lists[i].buffer != buffer) continue;
+      tables.resize(tables.size() + abi::MORPH_LIST_WORDS);
+      store(tables, tables.size() - abi::MORPH_LIST_WORDS, listRecords_[i]);
+    }
+    const std::uint32_t count = (wordsOf(tables) - first) / abi::MORPH_LIST_WORDS;
+    if (count == 0) continue;
+    if (Result<void> good = addDispatch(variantOf(Kernel::morphLists, limits_, tuning_),
+                                        divideUp(count, tuning_.workgroupSize),
+                                        abi::MorphListPush{first, count, 0});
+        !good)
+      return good;
+    lists_.push_back(dispatches_.back());
+    dispatches_.pop_back();
+    lists_.back().joints = BufferRole::gpuPoses;
+    lists_.back().poseBuffer = buffer;
+  }
+  return {};
 }
 
 namespace {
@@ -545,6 +575,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     // Not an output: the validation layer would report results that are read there and that another
     // dispatch wrote.
     parts[abi::BINDING_RESULTS] = orElse(results, tables);
+  } else if (variant.kernel == Kernel::morphLists) {
+    parts[abi::BINDING_WEIGHTS] = joints;
   } else if (variant.kernel == Kernel::sample || variant.kernel == Kernel::compose) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = buffers[BufferRole::palettes];
@@ -632,6 +664,10 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     commands.emplace_back(ClearCommand{unclear});
   }
   commands.emplace_back(BarrierCommand{Use::copyWrite, computeBoth});
+  for (const Dispatch& dispatch : lists_) {  // each reads and writes tables
+    listDispatch(dispatch, buffers);
+    commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
+  }
   if (culls) {
     listDispatch(visibility_[0], buffers);
     commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});

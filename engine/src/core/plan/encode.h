@@ -62,11 +62,11 @@ class Encoder {
   Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
   void writeInstances();
   void markEvenlySpaced(std::uint32_t firstRecord);
-  std::uint32_t appendMorphs(std::span<const MorphWeight> morphs);
   std::uint32_t appendExtension(const InstanceExtras& extras);
   void appendCandidates();
   void appendCulledDispatches();
   Result<void> addVisibilityDispatches(std::uint32_t record);
+  Result<void> addMorphLists();
   void listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers);
   void listDispatches(const PlanBuffers& buffers);
 
@@ -78,6 +78,9 @@ class Encoder {
   std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
   std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
+  /// Of each of `Work::morphLists`.
+  std::vector<abi::MorphListRecord> listRecords_;
+  std::vector<Dispatch> lists_;  ///< they write tables, before all others
   std::vector<Dispatch> dispatches_;
   std::array<Dispatch, 2> visibility_;  ///< the passes of the visibility kernel
   abi::VisibilityPush culled_{};        ///< push constants of the visibility kernel

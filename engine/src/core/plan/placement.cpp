@@ -319,6 +319,7 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   for (const Kernel kernel : {Kernel::sample, Kernel::compose}) {
     if (needs.figures) variants.push_back(figureVariant(kernel, limits, tuning));
   }
+  if (needs.morphsOnGpu) variants.push_back(variantOf(Kernel::morphLists, limits, tuning));
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));
   return idsOf(variants);
 }

@@ -80,7 +80,7 @@ inline PaletteForm paletteForm(Method method) {
 /// Matrices are copied, whether they scale or not.
 Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
                        const Tuning& tuning);
-/// The clear or the visibility kernel.
+/// The clear kernel, the visibility kernel, or the one that lists morph targets.
 Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
 /// Of the kernels that sample clips.
 Variant figureVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);

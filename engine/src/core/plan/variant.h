@@ -21,6 +21,7 @@ enum class Kernel : std::uint8_t {
   clear = 3,       ///< clears the results of instances that are skinned
   sample = 4,      ///< in a scene: samples the local transforms of figures from clips
   compose = 5,     ///< in a scene: makes the poses of figures from these
+  morphLists = 6,  ///< in a scene: lists the active morph targets of weights that the GPU writes
 };
 
 /// One specialization of a kernel, from which one pipeline is built.

@@ -32,6 +32,7 @@ void Work::begin(Groups& groupsInUse) {
   clearedResults.clear();
   instances.clear();
   culled.clear();
+  morphLists.clear();
   groups.clear();
 }
 

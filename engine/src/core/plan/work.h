@@ -33,8 +33,11 @@ struct InstanceExtras {
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
+  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are written on the GPU
 
-  bool isNeeded() const { return !morphs.empty() || result != notUsed || hasBox; }
+  bool isNeeded() const {
+    return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0;
+  }
 };
 
 /// The targets whose weight is not 0, in ascending order, since the order of a sum affects its last
@@ -75,6 +78,12 @@ struct Work {
     std::uint32_t palette;         ///< the unit where it begins
     std::uint32_t flags;           ///< abi::INSTANCE_RESTARTS and the like
   };
+  /// Active morph targets that the GPU lists: of an instance with `InstanceExtras::writtenMorphs`.
+  struct MorphList {
+    std::uint32_t instance;  ///< index into `instances`
+    std::uint32_t buffer;    ///< of poses, that has the weights
+    std::uint32_t weights;   ///< word offset there
+  };
   struct Culled {
     std::uint32_t instance;  ///< index into `instances`
     Candidate candidate;
@@ -89,6 +98,7 @@ struct Work {
   std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
   std::vector<Instance> instances;            ///< in the order in which they were added
   std::vector<Culled> culled;                 ///< those that the GPU may choose
+  std::vector<MorphList> morphLists;          ///< in the order of `instances`
   std::vector<Group> groups;                  ///< in the order of their first instance
   /// Of the groups, in the order of their dispatches. A dispatch skins groups of one variant, one
   /// output window each, culled or not.

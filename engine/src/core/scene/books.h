@@ -197,8 +197,11 @@ struct SceneInstance {
   MeshHandle mesh;
   PoseHandle poseHandle;
   bool bounds = false;
-  bool isWritten = false;      ///< `InstanceOutput::isWritten`
-  std::optional<Place> shown;  ///< where it was last recorded
+  MorphWriter morphWriter = MorphWriter::cpu;
+  std::uint32_t weightsBuffer = 0;  ///< of poses, that has the weights which the GPU writes …
+  Range weights;                    ///< … and where they are there, in joints
+  bool isWritten = false;           ///< `InstanceOutput::isWritten`
+  std::optional<Place> shown;       ///< where it was last recorded
 
   const Place& place() const { return shown ? *shown : target; }
 };
@@ -230,6 +233,7 @@ struct SceneBooks {
   Result<void> findRoom(SceneInstance& instance, bool isCulled);
   Result<void> makeRuns(SceneInstance& instance, bool isCulled);
   Result<void> remakeRuns(SceneInstance& instance, bool isCulled);
+  Result<void> takeWeights(SceneInstance& instance);
   void releaseRuns(SceneInstance& instance);
   void releaseTarget(SceneInstance& instance);
   void link(std::uint32_t index);
@@ -269,6 +273,7 @@ struct SceneBooks {
   // meshes_and_poses.cpp
   /// Keeps the bytes, or the owner does; null if the owner has them already.
   DERMIS_CORE_API Result<MeshHandle> addMesh(const MeshInfo& info, PackedMesh* mesh);
+  Result<void> mayWrite() const;
   Result<void> checkWrite(PoseHandle handle, bool writtenByGpu) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
   void dropPose(PoseHandle handle);
@@ -278,6 +283,8 @@ struct SceneBooks {
   }
   /// Fails for a pose that the CPU writes.
   DERMIS_CORE_API Result<BufferPart> posePart(PoseHandle pose) const;
+  /// Fails for an instance whose morph weights the CPU writes.
+  DERMIS_CORE_API Result<BufferPart> weightsPart(InstanceHandle instance) const;
   /// The memory that the CPU writes.
   DERMIS_CORE_API std::span<JointMatrix> matricesOf(const ScenePose& pose);
   /// The same of all poses of a figure; those of a scene on the CPU.

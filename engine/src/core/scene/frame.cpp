@@ -62,6 +62,10 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
     } else {
       work_.add(skinned);
     }
+    if (instance.extras.writtenMorphs == 0) return;
+    work_.morphLists.push_back(
+        {static_cast<std::uint32_t>(work_.instances.size() - 1), instance.weightsBuffer,
+         static_cast<std::uint32_t>(instance.weights.offset * sizeof(JointMatrix) / 4)});
   };
   add(instance.run);
   for (const PlacedRun& run : instance.furtherRuns) add(run);

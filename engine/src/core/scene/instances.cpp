@@ -35,6 +35,9 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
   job.box = instance.extras.box;
   job.bounds = instance.bounds;
   job.morphs = instance.extras.morphs;
+  // Nobody knows how many are active.
+  static constexpr MorphWeight one{0, 1};
+  if (instance.morphWriter != MorphWriter::cpu) job.morphs = {&one, 1};
   return job;
 }
 
@@ -66,6 +69,20 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
                    std::to_string(instance.poseHandle.index) + " has " +
                    std::to_string(pose->jointCount));
   }
+  if (instance.morphWriter != MorphWriter::cpu) {
+    if (instance.morphWriter > MorphWriter::gpu)
+      return notAValue("the instance: its morphWriter", instance.morphWriter, "MorphWriter");
+    if (owner_.isCpu)
+      return invalid("the GPU cannot write the instance's morph weights: the CPU skins it");
+    if (mesh->info.morphTargetCount == 0)
+      return invalid("the GPU cannot write the instance's morph weights: its mesh has no targets");
+    const std::uint32_t targets = instance.extras.writtenMorphs;
+    if (targets != 0 && mesh->info.morphTargetCount != targets) {
+      return invalid("the GPU writes the instance's " + std::to_string(targets) +
+                     " morph weights, but its mesh has " +
+                     std::to_string(mesh->info.morphTargetCount) + " targets");
+    }
+  }
   const PoseDescription own{pose->jointCount, 0, pose->promise};
   Batch batch;
   batch.poses = {&own, 1};
@@ -75,6 +92,41 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
   const OutputStreams streams = outputStreams(job);
   if (Result<void> good = checkJob(batch, job, streams, theInstance, limits_); !good) return good;
   return checkRuns(job, streams, theInstance);
+}
+
+/// Where the GPU writes morph weights: in a buffer of poses that it writes, which stays where it
+/// is.
+Result<void> SceneBooks::takeWeights(SceneInstance& instance) {
+  if (instance.morphWriter == MorphWriter::cpu) return {};
+  instance.extras.writtenMorphs = meshes_.at(instance.mesh.index).info.morphTargetCount;
+  const std::uint64_t joints =
+      (instance.extras.writtenMorphs * sizeof(float) + sizeof(JointMatrix) - 1) /
+      sizeof(JointMatrix);
+  const Result<std::optional<Range>> taken = takeJoints(joints, true, instance.weightsBuffer);
+  if (!taken) return taken.error();
+  if (!*taken) return noJoints(1, joints, true);
+  instance.weights = **taken;
+  return {};
+}
+
+Result<BufferPart> SceneBooks::weightsPart(InstanceHandle handle) const {
+  const SceneInstance* instance = instances_.find(handle);
+  if (instance == nullptr) return unknownHandle("instance", handle);
+  if (instance->morphWriter != MorphWriter::gpu)
+    return invalid("the CPU writes the morph weights of instance " + std::to_string(handle.index));
+  return BufferPart{poseBuffers_[instance->weightsBuffer].buffer.number,
+                    instance->weights.offset * sizeof(JointMatrix),
+                    instance->extras.writtenMorphs * sizeof(float)};
+}
+
+Result<void> Scene::markMorphsWritten(std::span<const InstanceHandle> instances) {
+  SceneBooks& books = changed();
+  if (Result<void> good = books.mayWrite(); !good) return good;
+  for (const InstanceHandle handle : instances) {
+    if (const Result<BufferPart> part = books.weightsPart(handle); !part) return part.error();
+    books.raise(handle.index, Need::stale);
+  }
+  return {};
 }
 
 Result<void> SceneBooks::takeResult(SceneInstance& instance) {
@@ -221,6 +273,7 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   instance.vertexBytes = attributeBytes(description.layout);
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
+  instance.morphWriter = description.morphWriter;
   if (Result<void> good = books.check(instance, description.updateInterval); !good)
     return good.error();
   if (!books.hasSlot()) {
@@ -234,9 +287,17 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
     books.freeResult(instance);
     return found.error();
   }
+  if (Result<void> taken = books.takeWeights(instance); !taken) {
+    books.freeResult(instance);
+    books.releaseTarget(instance);
+    return taken.error();
+  }
+  // The last, since units stay reserved.
   if (Result<void> reserved = books.reserveUnits(instance); !reserved) {
     books.freeResult(instance);
     books.releaseTarget(instance);
+    if (instance.weights.size != 0)
+      books.poseBuffers_[instance.weightsBuffer].joints.free(instance.weights);
     return reserved.error();
   }
 
@@ -270,6 +331,8 @@ Result<void> Scene::removeInstance(InstanceHandle handle) {
   books.releaseTarget(*instance);
   if (instance->shown) books.retire(books.outputStore_.ranges, instance->shown->bytes);
   books.freeResult(*instance);
+  if (instance->weights.size != 0)
+    books.retire(books.poseBuffers_[instance->weightsBuffer].joints, instance->weights);
   if (books.states_[handle.index].isCulled) {
     books.culled_[instance->culledIndex] = books.culled_.back();
     books.instances_.at(books.culled_.back()).culledIndex = instance->culledIndex;
@@ -388,6 +451,10 @@ Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
   SceneInstance& instance = instances_.at(change.instance.index);
   const bool hasNewMesh = change.mesh && *change.mesh != instance.mesh;
   const bool hasNewBox = change.box && isSnormPosition(instance.layout.positions);
+  if (change.morphs && instance.morphWriter != MorphWriter::cpu) {
+    return invalid("instance " + std::to_string(change.instance.index) +
+                   ": the GPU writes its morph weights; use markMorphsWritten");
+  }
   // A box and morph weights alone need neither other kernels nor room.
   if (hasNewMesh || change.pose || change.method || (hasNewBox && change.morphs))
     return rebuild(instance, change);

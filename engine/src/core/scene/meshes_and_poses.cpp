@@ -137,10 +137,14 @@ std::span<JointMatrix> SceneBooks::matricesOf(const ScenePose& pose) {
   return {begin + offsetOf(pose) / sizeof(JointMatrix), pose.jointCount};
 }
 
-Result<void> SceneBooks::checkWrite(PoseHandle handle, bool writtenByGpu) const {
+Result<void> SceneBooks::mayWrite() const {
   // Before the first frame, poses are written for it.
-  if (!hasBegun_ && frame_ != 0)
-    return invalid("a pose can be written only between beginFrame and record");
+  if (hasBegun_ || frame_ == 0) return {};
+  return invalid("a pose can be written only between beginFrame and record");
+}
+
+Result<void> SceneBooks::checkWrite(PoseHandle handle, bool writtenByGpu) const {
+  if (Result<void> good = mayWrite(); !good) return good;
   const ScenePose* pose = poses_.find(handle);
   if (pose == nullptr) return unknownHandle("pose", handle);
   if (pose->figure != notUsed) return ofFigure(handle, *pose);

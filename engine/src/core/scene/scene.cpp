@@ -163,7 +163,8 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
                       .layout = description.layout,
                       .bounds = description.bounds,
                       .culledOnGpu = description.culledOnGpu,
-                      .figures = !description.pose && books_->figures_.size() != 0};
+                      .figures = !description.pose && books_->figures_.size() != 0,
+                      .morphsOnGpu = description.morphWriter != MorphWriter::cpu};
   if (description.mesh) {
     const SceneMesh* mesh = books_->meshes_.find(description.mesh);
     if (mesh == nullptr) return unknownHandle("mesh", description.mesh);

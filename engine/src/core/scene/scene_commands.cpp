@@ -53,5 +53,8 @@ std::uint32_t SceneCommands::outputBuffer() const {
 Result<BufferPart> SceneCommands::posePart(PoseHandle pose) const {
   return SceneAccess::books(scene()).posePart(pose);
 }
+Result<BufferPart> SceneCommands::weightsPart(InstanceHandle instance) const {
+  return SceneAccess::books(scene()).weightsPart(instance);
+}
 
 }  // namespace dermis

@@ -202,9 +202,15 @@ std::uint64_t SceneRecorder::outputGeneration() const {
 }
 
 Result<BufferRange> SceneRecorder::poseRange(PoseHandle pose) const {
-  const Result<BufferPart> part = state_->books().posePart(pose);
+  return state_->rangeOf(state_->books().posePart(pose));
+}
+Result<BufferRange> SceneRecorder::weightsRange(InstanceHandle instance) const {
+  return state_->rangeOf(state_->books().weightsPart(instance));
+}
+
+Result<BufferRange> SceneRecorder::State::rangeOf(const Result<BufferPart>& part) const {
   if (!part) return part.error();
-  const BufferRange& buffer = state_->bound[part->buffer].range;
+  const BufferRange& buffer = bound.at(part->buffer).range;
   return BufferRange{buffer.buffer, buffer.offset + part->offset, part->size};
 }
 

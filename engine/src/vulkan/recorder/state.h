@@ -30,6 +30,7 @@ struct SceneRecorder::State {
 
   Result<void*> createBuffer(const SceneBuffer& wanted);
   void releaseBuffer(std::uint32_t number);
+  Result<BufferRange> rangeOf(const Result<BufferPart>& part) const;
   void frameBegun(std::uint64_t completedFrame);
   Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   Result<void> makeStaging();
