@@ -229,6 +229,28 @@ double PackedRig::checkSkin(std::span<const ClipLayer> layers, std::uint32_t ski
   return worst;
 }
 
+double PackedRig::checkWeights(std::span<const ClipLayer> layers) const {
+  double worst = 0;
+  for (std::uint32_t node = 0; node < skeleton.nodes.size(); ++node) {
+    std::vector<float> weights(bank->weightCount(node));
+    EXPECT_EQ(weights.size(), skeleton.nodes[node].weights.size());
+    const Result<void> sampled = sampleWeights(*bank, layers, node, weights);
+    EXPECT_TRUE(sampled.ok()) << sampled.error().message;
+    const Result<reference::SampledWeights> expected =
+        reference::sampleWeights(skeleton, clips, maskSpans(), layers, node, &*bank);
+    if (!expected) {
+      ADD_FAILURE() << expected.error().message;
+      return HUGE_VAL;
+    }
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double off = std::abs(double{weights[i]} - expected->weights.at(i));
+      EXPECT_LE(off, expected->bounds.at(i)) << "node " << node << ", weight " << i;
+      if (off > 0) worst = std::max(worst, off / expected->bounds[i]);
+    }
+  }
+  return worst;
+}
+
 bool PackedRig::isNearJump(const ClipLayer& layer) const {
   const ClipView& clip = clips[layer.clip];
   const double time = double{clipTime(bank->clip(layer.clip), layer.time, layer.hold)};
@@ -267,8 +289,12 @@ std::vector<ClipLayer> randomLayers(const PackedRig& rig, std::mt19937& random) 
   return layers;
 }
 
-void forEachAnimatedModel(std::uint32_t maxClips,
-                          const std::function<void(gltf::Model, std::uint32_t)>& call) {
+namespace {
+
+/// Returns the number of models.
+std::uint32_t forEachModelWith(const std::function<bool(gltf::Model&)>& isWanted,
+                               std::uint32_t maxClips,
+                               const std::function<void(gltf::Model, std::uint32_t)>& call) {
   std::vector<std::filesystem::path> files;
   for (const char* name : {"arm.glb", "bar.glb", "figure.glb"})
     files.push_back(std::filesystem::path(sampleModels) / name);
@@ -280,11 +306,35 @@ void forEachAnimatedModel(std::uint32_t maxClips,
   for (const std::filesystem::path& file : files) {
     SCOPED_TRACE(file.string());
     gltf::Model model = loaded(gltf::load(file));
-    if (model.skins.empty() || model.clips.empty()) continue;
+    if (!isWanted(model)) continue;
     if (model.clips.size() > maxClips) model.clips.resize(maxClips);
     call(std::move(model), number++);
   }
-  EXPECT_GE(number, testDataFolder() ? 20u : 3u);
+  return number;
+}
+
+bool animatesWeights(const gltf::Clip& clip) {
+  return std::ranges::count(clip.channels, ChannelPath::weights, &gltf::Channel::path) > 0;
+}
+
+}  // namespace
+
+void forEachAnimatedModel(std::uint32_t maxClips,
+                          const std::function<void(gltf::Model, std::uint32_t)>& call) {
+  const auto isWanted = [](const gltf::Model& model) {
+    return !model.skins.empty() && !model.clips.empty();
+  };
+  EXPECT_GE(forEachModelWith(isWanted, maxClips, call), testDataFolder() ? 20u : 3u);
+}
+
+void forEachMorphedModel(std::uint32_t maxClips,
+                         const std::function<void(gltf::Model, std::uint32_t)>& call) {
+  const auto isWanted = [](gltf::Model& model) {
+    std::erase_if(model.clips, [](const gltf::Clip& clip) { return !animatesWeights(clip); });
+    if (model.skins.empty()) model.skins.push_back({"made", {0}, {JointMatrix{}}});
+    return !model.clips.empty();
+  };
+  EXPECT_GE(forEachModelWith(isWanted, maxClips, call), testDataFolder() ? 3u : 0u);
 }
 
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {

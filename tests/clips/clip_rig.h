@@ -68,6 +68,8 @@ class PackedRig {
   /// the largest error divided by its bound.
   double check(std::span<const ClipLayer> layers) const;
   double check(const ClipLayer& layer) const { return check(std::span(&layer, 1)); }
+  /// The same for the morph weights of all nodes.
+  double checkWeights(std::span<const ClipLayer> layers) const;
   /// Whether the bank may jump a little earlier or later than the clip does at this time.
   bool isNearJump(const ClipLayer& layer) const;
 
@@ -99,6 +101,10 @@ std::vector<ClipLayer> randomLayers(const PackedRig& rig, std::mt19937& random);
 /// test data if there are any. At most `maxClips` of its clips are kept.
 void forEachAnimatedModel(std::uint32_t maxClips,
                           const std::function<void(gltf::Model, std::uint32_t)>& call);
+
+/// The same with each model in which clips animate morph weights. One without skins gets one.
+void forEachMorphedModel(std::uint32_t maxClips,
+                         const std::function<void(gltf::Model, std::uint32_t)>& call);
 
 /// Whether two poses are the same bits.
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b);

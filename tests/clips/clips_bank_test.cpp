@@ -20,7 +20,7 @@ namespace dermis::test {
 namespace {
 
 /// Small, but with all that a bank may hold: masks, an additive clip, one that does not wrap, a
-/// constant track, and a jump.
+/// constant track, a jump, and morph weights.
 PackedRig& smallRig() {
   static const std::unique_ptr<PackedRig> rig = [] {
     gltf::Model model = armRig();
@@ -29,6 +29,14 @@ PackedRig& smallRig() {
                      channel(arm::body, ChannelPath::translation, {0, 0.4f}, {0, 0, 0, 1, 1, 1},
                              Interpolation::step)};
     model.clips.push_back(std::move(jump));
+    model.meshes.resize(1);
+    model.meshes[0].morphTargetCount = 4;
+    model.meshes[0].morphWeights = {0, 0.5f, 0, 1};
+    model.nodes[arm::stand].mesh = model.nodes[arm::hand].mesh = 0;
+    gltf::Channel smile = channel(arm::stand, ChannelPath::weights, {0, 0.3f, 1.25f},
+                                  {0, 0.5f, 0, 1, 1, 0.5f, 0, 0, 0.25f, 0.5f, 0, 2});
+    smile.components = 4;
+    model.clips[0].channels.push_back(smile);
     auto made = std::make_unique<PackedRig>(std::move(model));
     made->clips[1].additive = true;
     made->clips[1].baseClip = 0;
@@ -56,7 +64,15 @@ void expectRefused(std::span<const std::byte> bytes, ErrorCode code = ErrorCode:
   EXPECT_FALSE(result.error().message.empty());
 }
 
-/// The pose is as long as it has to be, so that sanitizers see what is written behind it.
+/// Results are as long as they have to be, so that sanitizers see what is written behind them.
+void sampleAllWeights(const PackedClips& bank, std::span<const ClipLayer> layers) {
+  for (std::uint32_t node = 0; node < arm::nodeCount; ++node) {
+    ASSERT_LE(bank.weightCount(node), bank.bytes().size());
+    std::vector<float> weights(bank.weightCount(node));
+    EXPECT_TRUE(sampleWeights(bank, layers, node, weights).ok());
+  }
+}
+
 void samplePoses(const PackedClips& bank) {
   ASSERT_LE(bank.clipCount(), maxClips);
   ASSERT_LE(bank.maskCount(), maxMasks);
@@ -75,9 +91,11 @@ void samplePoses(const PackedClips& bank) {
             ClipLayer{.clip = lastClip, .time = time, .weight = 2},
             ClipLayer{.clip = clip, .time = time, .hold = true}};
         EXPECT_TRUE(samplePose(bank, layers, skin, pose).ok());
+        sampleAllWeights(bank, layers);
       }
     }
   }
+  sampleAllWeights(bank, {});
   for (std::uint32_t node = 0; node < arm::nodeCount + 2; ++node) (void)bank.error(node);
 }
 
@@ -102,6 +120,8 @@ TEST_F(ClipsBank, ComesBackAsItWas) {
     EXPECT_EQ(result->error(node).translation, bank().error(node).translation);
     EXPECT_EQ(result->error(node).rotation, bank().error(node).rotation);
     EXPECT_EQ(result->error(node).scale, bank().error(node).scale);
+    EXPECT_EQ(result->error(node).weight, bank().error(node).weight);
+    EXPECT_EQ(result->weightCount(node), node == arm::stand || node == arm::hand ? 4u : 0u);
   }
   const std::array<ClipLayer, 2> layers{ClipLayer{.clip = 0, .time = 0.7, .mask = 2},
                                         ClipLayer{.clip = 1, .time = 0.2, .weight = 0.5f}};

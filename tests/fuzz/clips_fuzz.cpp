@@ -51,7 +51,8 @@ struct Source {
   Skeleton skeleton;
   std::vector<std::vector<std::uint32_t>> joints;
   std::vector<std::vector<JointMatrix>> inverseBind;
-  std::vector<std::vector<Keys>> keys;  ///< of channels, by clip
+  std::vector<std::vector<float>> weights;  ///< of nodes
+  std::vector<std::vector<Keys>> keys;      ///< of channels, by clip
   std::vector<ClipView> clips;
   std::vector<std::vector<float>> masks;
   std::vector<std::span<const float>> maskViews;
@@ -83,7 +84,7 @@ void takeSkin(Input& input, Source& source) {
   source.skeleton.skins.push_back({"skin", joints, matrices});
 }
 
-Source::Keys takeKeys(Input& input, const ChannelView& channel) {
+Source::Keys takeKeys(Input& input, const ChannelView& channel, const Skeleton& skeleton) {
   Source::Keys keys;
   float time = input.number();
   for (std::uint32_t key = 1 + input.below(12); key > 0; --key) {
@@ -91,7 +92,9 @@ Source::Keys takeKeys(Input& input, const ChannelView& channel) {
     time += static_cast<float>(input.below(64)) / 64;
     if (input.below(32) == 0) time = input.number();
   }
-  const std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+  std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+  if (channel.path == ChannelPath::weights && channel.node < skeleton.nodes.size())
+    width = std::max<std::size_t>(1, skeleton.nodes[channel.node].weights.size());
   const std::size_t parts = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
   keys.values.resize(keys.times.size() * width * parts - (input.below(64) == 0 ? 1 : 0));
   for (float& value : keys.values) value = input.number();
@@ -111,9 +114,9 @@ void takeClip(Input& input, Source& source) {
   for (std::uint32_t count = input.below(6); count > 0; --count) {
     ChannelView& channel = clip.channels.emplace_back();
     channel.node = input.below(static_cast<std::uint32_t>(source.skeleton.nodes.size()) + 1);
-    channel.path = static_cast<ChannelPath>(input.below(16) == 0 ? input.below(6) : input.below(3));
+    channel.path = static_cast<ChannelPath>(input.below(16) == 0 ? input.below(6) : input.below(4));
     channel.interpolation = static_cast<Interpolation>(input.below(16) == 0 ? 3 : input.below(3));
-    keys.push_back(takeKeys(input, channel));
+    keys.push_back(takeKeys(input, channel, source.skeleton));
   }
   for (std::size_t i = 0; i < keys.size(); ++i) {
     clip.channels[i].times = keys[i].times;
@@ -125,6 +128,12 @@ Result<PackedClips> packSource(Input& input) {
   Source source;
   for (std::uint32_t count = 1 + input.below(8); count > 0; --count)
     source.skeleton.nodes.push_back(takeNode(input));
+  source.weights.resize(source.skeleton.nodes.size());
+  for (std::size_t node = 0; node < source.weights.size(); ++node) {
+    source.weights[node].resize(input.below(3) * std::size_t{input.below(4)});
+    for (float& weight : source.weights[node]) weight = input.number();
+    source.skeleton.nodes[node].weights = source.weights[node];
+  }
   for (std::uint32_t count = input.below(3) + 1; count > 0; --count) takeSkin(input, source);
   for (std::uint32_t count = input.below(4); count > 0; --count) takeClip(input, source);
   for (std::uint32_t count = input.below(3); count > 0; --count) {
@@ -135,6 +144,7 @@ Result<PackedClips> packSource(Input& input) {
   PackClipsOptions options;
   options.masks = source.maskViews;
   if (input.below(2) == 0) options.maxError = double{input.number()};
+  if (input.below(4) == 0) options.maxWeightError = double{input.number()};
   PackClipsReport report;
   Result<PackedClips> packed = packClips(source.skeleton, source.clips, options, &report);
   if (!packed) return packed;
@@ -145,7 +155,7 @@ Result<PackedClips> packSource(Input& input) {
   return packed;
 }
 
-/// Small, with masks, a clip that is added, and one that does not wrap.
+/// Small, with masks, weights, a clip that is added, and one that does not wrap.
 std::vector<std::uint32_t> makeGoodBank() {
   Skeleton skeleton;
   skeleton.nodes.resize(3);
@@ -153,6 +163,8 @@ std::vector<std::uint32_t> makeGoodBank() {
   skeleton.nodes[1].translation = {0, 1, 0};
   skeleton.nodes[2].parent = 1;
   skeleton.nodes[2].translation = {0.5, 1, 0};
+  const std::array<float, 4> weights{0, 0.5f, 1, 0};
+  skeleton.nodes[2].weights = weights;
   const std::array<std::uint32_t, 3> joints{0, 2, 1};
   const std::array<JointMatrix, 3> matrices;
   skeleton.skins = {{"all", joints, matrices},
@@ -164,6 +176,7 @@ std::vector<std::uint32_t> makeGoodBank() {
   std::array<ClipView, 3> clips;
   for (ClipView& clip : clips) clip.duration = 1;
   clips[0].channels = {{1, rotation, Interpolation::linear, times, rotations}};
+  clips[0].channels.push_back({2, ChannelPath::weights, Interpolation::linear, times, rotations});
   clips[1].channels = {{0, translation, Interpolation::step, times, places},
                        {2, scale, Interpolation::step, times, places}};
   clips[1].wraps = false;
@@ -210,7 +223,13 @@ void sample(const PackedClips& bank, Input& input) {
     require(sampled.ok() || !sampled.error().message.empty());
     require(samplePose(bank, {}, skin, pose).ok());
   }
-  for (std::uint32_t node = 0; node < 9; ++node) (void)bank.error(node);
+  for (std::uint32_t node = 0; node < 9; ++node) {
+    (void)bank.error(node);
+    std::vector<float> weights(bank.weightCount(node));
+    const Result<void> sampled = sampleWeights(bank, layers, node, weights);
+    require(sampled.ok() || !sampled.error().message.empty());
+    require(sampleWeights(bank, {}, node, weights).ok());
+  }
 }
 
 }  // namespace

@@ -136,6 +136,8 @@ const double lessThanOne = double{std::nextafter(1.0f, 0.0f)};
 
 TEST(ReferenceClips, TwoNodesByHand) {
   Rig rig;
+  constexpr std::array<float, 1> weights{0};
+  rig.skeleton.nodes[1].weights = weights;
   ClipView& clip = rig.addClip();
   rig.animate(clip, 0, rotation, {0, 1}, joined({turned(zAxis, 0), turned(zAxis, 90)}));
   rig.animate(clip, 1, translation, {0, 1}, {0, 2, 0, 4, 2, 0});
@@ -372,6 +374,48 @@ TEST(ReferenceClips, AddsInTheOrderOfLayers) {
   expectNear(rig.handTurns({{.clip = 1}, {.clip = 0}}, {1, 2, 3}), y * x * dvec3(1, 2, 3), 1e-6);
 }
 
+// ---- Morph weights.
+
+TEST(ReferenceClips, WeightsByHand) {
+  Rig rig;
+  constexpr std::array<float, 2> rest{0.25f, 0.5f};
+  rig.skeleton.nodes[1].weights = rest;
+  constexpr auto weights = ChannelPath::weights;
+  rig.animate(rig.addClip(), 1, weights, {0, 2}, {0, 1, 1, 3});
+  rig.animate(rig.addClip(), 1, weights, {0, 2}, {0, 1, 1, 3}, Interpolation::step);
+  // The tangents that leave the first key are (1, 0), those that reach the second (0, -2).
+  rig.animate(rig.addClip(), 1, weights, {0, 2}, {9, 9, 0, 1, 1, 0, 0, -2, 1, 3, 9, 9},
+              Interpolation::cubicSpline);
+  rig.addClip();
+  rig.animate(rig.addClip(), 1, weights, {0}, {1, 0});
+  rig.makeAdditive();
+  rig.animate(rig.addClip(), 1, weights, {0}, {1, 0});
+  rig.makeAdditive(0, 2);
+  rig.addMask({1, 0.5f});
+  rig.addMask({1, 0});
+  const auto sampled = [&rig](const std::vector<ClipLayer>& layers, std::uint32_t node = 1) {
+    const Result<reference::SampledWeights> result =
+        reference::sampleWeights(rig.skeleton, rig.clips, rig.masks, layers, node);
+    EXPECT_TRUE(result.ok());
+    EXPECT_TRUE(result->bounds.empty());
+    return result->weights;
+  };
+  using Weights = std::vector<double>;
+  EXPECT_EQ(sampled({{.clip = 0, .time = 0.5}}), (Weights{0.25, 1.5}));
+  EXPECT_EQ(sampled({{.clip = 1, .time = 0.5}}), (Weights{0, 1}));
+  EXPECT_EQ(sampled({{.clip = 2, .time = 1}}), (Weights{0.5 + 2 * 0.125, 2 + 2 * 0.25}));
+  for (const std::vector<ClipLayer>& none :
+       {std::vector<ClipLayer>{}, {{.clip = 3}}, {{.weight = 0}}, {{.mask = 2}}})
+    EXPECT_EQ(sampled(none), (Weights{0.25, 0.5}));
+  EXPECT_EQ(sampled({{.clip = 0, .time = 2}, {.clip = 1, .weight = 2, .mask = 1}}),
+            (Weights{0.5, 2}));
+  EXPECT_EQ(sampled({{.clip = 4, .weight = -0.5f}}), (Weights{0.25 - 0.375, 0.5 + 0.25}));
+  EXPECT_EQ(sampled({{.clip = 0, .time = 2}, {.clip = 5, .weight = 2, .mask = 1}}),
+            (Weights{1, 3 - 3}));
+  EXPECT_TRUE(sampled({{.clip = 0}}, 0).empty());
+  EXPECT_TRUE(sampled({{.clip = 0}}, 2).empty());
+}
+
 // ---- Skeletons.
 
 TEST(ReferenceClips, ParentsAreInAnyOrderAndMayHaveMatrices) {
@@ -441,6 +485,7 @@ TEST(ReferenceClips, RefusesWhatDoesNotFit) {
   refusesChannel([](ChannelView& channel) { channel.times = channel.values = {}; });
   refusesChannel([](ChannelView& channel) { channel.times = channel.times.first(1); });
   refusesChannel([](ChannelView& channel) { channel.path = translation; });
+  refusesChannel([](ChannelView& channel) { channel.path = ChannelPath::weights; });
   refusesChannel([](ChannelView& channel) { channel.interpolation = Interpolation::linear; });
 }
 

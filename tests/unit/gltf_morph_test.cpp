@@ -1,7 +1,10 @@
 // The weights of morph targets: who says them, and what lies between two keys, against numbers
 // worked out by hand.
 #include <limits>
+#include <span>
+#include <vector>
 
+#include "dermis/clips.h"
 #include "gltf_builder.h"
 #include "test_data.h"
 
@@ -39,6 +42,27 @@ TEST(GltfMorph, TheClipGoesBeforeTheNodeAndTheNodeBeforeTheMesh) {
   EXPECT_EQ(morphWeights(model, 0, gltf::none, 0), (Floats{0, 0.125f}));
   EXPECT_EQ(morphWeights(model, 0, 7, 0), (Floats{0, 0.125f})) << "there is no such clip";
   EXPECT_EQ(morphWeights(model, 0, 0, 0), (Floats{3, 4}));
+}
+
+TEST(GltfMorph, SkeletonAndClipsHaveWeights) {
+  FileBuilder file = animated({0, 1}, {3, 4, 5, 6}, "STEP");
+  const auto weightsOf = [](const gltf::Model& model) {
+    const std::span<const float> weights = gltf::skeleton(model).nodes[0].weights;
+    return Floats(weights.begin(), weights.end());
+  };
+  gltf::Model model = loaded(file);
+  EXPECT_EQ(weightsOf(model), (Floats{0, 0}));
+  EXPECT_TRUE(gltf::skeleton(model).nodes[1].weights.empty());
+  const std::vector<ClipView> clips = gltf::clips(model);
+  ASSERT_EQ(clips.at(0).channels.size(), 1u);
+  EXPECT_EQ(clips[0].channels[0].path, ChannelPath::weights);
+  EXPECT_EQ(clips[0].channels[0].values.size(), 4u);
+  file.json["meshes"][0]["weights"] = {0.25};
+  model = expectNoted(file, "mesh 0: it has 1 weights for 2 morph targets");
+  EXPECT_EQ(weightsOf(model), (Floats{0.25f, 0}));
+  file.json["nodes"][0]["weights"] = {0.5};
+  model = expectNoted(file, "node 0: it has 1 weights for 2 morph targets");
+  EXPECT_EQ(weightsOf(model), (Floats{0.5f, 0}));
 }
 
 TEST(GltfMorph, AClipThatMovesSomethingElseLeavesTheWeights) {

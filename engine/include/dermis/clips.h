@@ -34,8 +34,11 @@ struct SkeletonNode {
   std::array<double, 3> translation{0, 0, 0};
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w; not all 0
   std::array<double, 3> scale{1, 1, 1};
-  /// Replaces the three members above. No clip may animate such a node.
+  /// Replaces the three members above. No clip may animate such a node, except its weights.
   std::optional<Transform> matrix = {};
+  /// Morph weights at rest, one for each morph target of the node's mesh. They are finite, and
+  /// remain the caller's.
+  std::span<const float> weights = {};
 };
 
 /// The joints of a skin, as a pose has them.
@@ -66,12 +69,13 @@ struct ChannelView {
   Interpolation interpolation = Interpolation::linear;
   /// Seconds, finite, not descending, at least one. If two are equal, the value jumps there.
   std::span<const float> times = {};
-  /// 3 finite values for each key, or 4 for rotations: x, y, z, w, of any length but 0. For
-  /// `cubicSpline` three times as many: in-tangent, value, out-tangent.
+  /// 3 finite values for each key, or 4 for rotations: x, y, z, w, of any length but 0; for weights
+  /// as many as the node has. For `cubicSpline` three times as many: in-tangent, value,
+  /// out-tangent.
   std::span<const float> values = {};
 };
 
-/// A clip. A channel of weights is not packed.
+/// A clip.
 struct ClipView {
   std::string_view name = {};              ///< for messages
   double duration = 0;                     ///< seconds, finite, at least 0
@@ -99,12 +103,14 @@ struct PackClipsOptions {
   /// Masks, at most 31: a factor from 0 to 1 for each node of the skeleton. Layers name them by
   /// their number in this list, from 1 on.
   std::span<const std::span<const float>> masks = {};
+  /// How far a morph weight may be from that of the clips. 0: 1/1000.
+  double maxWeightError = 0;
 };
 
 /// What `packClips` made.
 struct PackClipsReport {
   std::uint64_t byteCount = 0;
-  std::uint64_t keyCount = 0;        ///< of all tracks
+  std::uint64_t keyCount = 0;        ///< of all tracks; one track has up to three morph weights
   std::uint32_t animatedTracks = 0;  ///< tracks with keys
   std::uint32_t constantTracks = 0;  ///< tracks with one value
   double maxError = 0;               ///< that was asked for
@@ -122,13 +128,15 @@ struct ClipInfo {
   bool additive = false;
 };
 
-/// How far the bank's local transform of a node may be from that of its clips at any time at which
-/// no jump is rounded; for additive clips, their difference. Between keys it is bounded by the
-/// curvature of the source, except for splines of rotations, which are measured.
+/// How far the bank's local transform of a node, and its morph weights, may be from those of its
+/// clips at any time at which no jump is rounded; for additive clips, their difference. Between
+/// keys it is bounded by the curvature of the source, except for splines of rotations, which are
+/// measured.
 struct ClipError {
   float translation = 0;  ///< distance
   float rotation = 0;     ///< angle in radians
   float scale = 0;        ///< of each factor
+  float weight = 0;       ///< of each morph weight
 };
 
 /// A bank: a skeleton with its skins and clips, as a blob of little-endian 32-bit words, which it
@@ -153,6 +161,8 @@ class DERMIS_CORE_API PackedClips {
   std::uint32_t jointCount(std::uint32_t skin) const;
   /// What is known of a clip. If there is none with this number, a clip of duration 0.
   ClipInfo clip(std::uint32_t clip) const;
+  /// The number of morph weights of a node of the skeleton, as packed. 0 if there is none.
+  std::uint32_t weightCount(std::uint32_t node) const;
   /// The error of a node of the skeleton. 0 where no clip moves it, and if there is none.
   ClipError error(std::uint32_t node) const;
 
@@ -183,8 +193,8 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 /// Fails with
 /// - `invalidArgument` if a number is not finite, an index or a size does not fit, parents form a
 ///   cycle, a rotation is 0, a node with a matrix is animated, two channels have one node and path,
-///   times descend, a clip is its own base or its base is additive, an option is out of range, or
-///   there are no skins, or one has no joints;
+///   times descend, weights of a node without any are animated, a clip is its own base or its base
+///   is additive, an option is out of range, or there are no skins, or one has no joints;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
 ///   `maxPoseJoints` joints, a number leaves the range of float32, or the error cannot be kept: the
 ///   message names the clip and the node.
@@ -228,6 +238,16 @@ DERMIS_CORE_API float clipTime(const ClipInfo& clip, double seconds, bool hold =
 /// `jointCount(skin)` elements. The message names the layer.
 DERMIS_CORE_API Result<void> samplePose(const PackedClips& bank, std::span<const ClipLayer> layers,
                                         std::uint32_t skin, std::span<JointMatrix> pose);
+
+/// Samples the morph weights of a node of the skeleton, blended as `samplePose` blends its
+/// translation: the mean Σ w m x / Σ w m, where the sum is 0 the weights at rest, and then
+/// x <- x + w m · difference for each additive layer. The same bits on every processor.
+///
+/// O(weights × layers). Any thread. Fails, and writes nothing, as `samplePose` does, and if
+/// `weights` does not have `weightCount(node)` elements.
+DERMIS_CORE_API Result<void> sampleWeights(const PackedClips& bank,
+                                           std::span<const ClipLayer> layers, std::uint32_t node,
+                                           std::span<float> weights);
 
 // ---- Boxes for culling, computed once, for a mesh that clips move. docs/bounds.md has the proof.
 

@@ -43,8 +43,8 @@ struct Node {
   /// whose translation, rotation or scale a clip animates has none: its matrix has been decomposed
   /// into these members, with a note.
   std::optional<std::array<double, 16>> matrix;
-  /// Morph weights that override those of the mesh, in the order of its morph targets; empty if the
-  /// node has none. If there are fewer than targets, the others are 0.
+  /// Morph weights that override those of the mesh, one for each of its morph targets; empty if the
+  /// node has none.
   std::vector<float> morphWeights;
 };
 
@@ -199,8 +199,7 @@ struct Mesh {
   /// The largest number of morph targets of a primitive, decoded or not. A primitive with fewer has
   /// the first targets; the others do not displace it.
   std::uint32_t morphTargetCount = 0;
-  /// In the order of the morph targets. If there are fewer than targets, the others are 0.
-  std::vector<float> morphWeights;
+  std::vector<float> morphWeights;  ///< one for each morph target
 };
 
 using dermis::ChannelPath;
@@ -380,8 +379,8 @@ DERMIS_GLTF_API std::vector<float> morphWeights(const Model& model, std::uint32_
 DERMIS_GLTF_API Skeleton skeleton(const Model& model);
 Skeleton skeleton(const Model&& model) = delete;
 
-/// All clips of the model, with its numbers, as `packClips` takes them: all channels but those of
-/// weights. Points into the model, which must outlive them and must not be changed.
+/// All clips of the model, with its numbers, as `packClips` takes them. Points into the model,
+/// which must outlive them and must not be changed.
 DERMIS_GLTF_API std::vector<ClipView> clips(const Model& model);
 std::vector<ClipView> clips(const Model&& model) = delete;
 

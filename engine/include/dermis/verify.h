@@ -101,6 +101,20 @@ DERMIS_VERIFY_API Result<SampledPose> samplePose(const Skeleton& skeleton,
                                                  std::uint32_t skin,
                                                  const PackedClips* bank = nullptr);
 
+/// What `sampleWeights` returns.
+struct SampledWeights {
+  std::vector<double> weights;
+  /// How far each weight of the bank may be from it, or empty if there was no bank.
+  std::vector<double> bounds;
+};
+
+/// Samples the morph weights of a node in the same way, for `dermis::sampleWeights`. Empty if there
+/// is no such node.
+DERMIS_VERIFY_API Result<SampledWeights> sampleWeights(
+    const Skeleton& skeleton, std::span<const ClipView> clips,
+    std::span<const std::span<const float>> masks, std::span<const ClipLayer> layers,
+    std::uint32_t node, const PackedClips* bank = nullptr);
+
 }  // namespace dermis::reference
 
 // ---- The accuracy contract: how near a result must be to the reference, and whether it is.

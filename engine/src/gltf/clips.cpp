@@ -5,9 +5,13 @@
 namespace dermis::gltf {
 namespace {
 
-SkeletonNode skeletonNode(const Node& node) {
+SkeletonNode skeletonNode(const Model& model, const Node& node) {
   SkeletonNode result{node.name, node.parent, node.translation, node.rotation, node.scale};
   if (node.matrix) result.matrix = localTransform(node);
+  if (node.mesh != none) {
+    result.weights =
+        node.morphWeights.empty() ? model.meshes[node.mesh].morphWeights : node.morphWeights;
+  }
   return result;
 }
 
@@ -15,10 +19,7 @@ ClipView clipView(const Clip& clip) {
   ClipView result;
   result.name = clip.name;
   result.duration = clip.duration;
-  for (const Channel& channel : clip.channels) {
-    if (channel.path == ChannelPath::weights) continue;
-    result.channels.push_back(viewOf(channel));
-  }
+  for (const Channel& channel : clip.channels) result.channels.push_back(viewOf(channel));
   return result;
 }
 
@@ -31,7 +32,7 @@ ChannelView viewOf(const Channel& channel) {
 Skeleton skeleton(const Model& model) {
   Skeleton result;
   result.nodes.reserve(model.nodes.size());
-  for (const Node& node : model.nodes) result.nodes.push_back(skeletonNode(node));
+  for (const Node& node : model.nodes) result.nodes.push_back(skeletonNode(model, node));
   result.skins.reserve(model.skins.size());
   for (const Skin& skin : model.skins)
     result.skins.push_back({skin.name, skin.joints, skin.inverseBindMatrices});

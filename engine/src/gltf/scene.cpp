@@ -117,6 +117,14 @@ class RigidMeshes {
   std::vector<bool> mayRead_;    ///< by mesh
 };
 
+/// Adds zeros for the morph targets without a weight.
+void fillUp(Source& source, const char* kind, std::size_t number, std::uint32_t targets,
+            std::vector<float>& weights) {
+  if (weights.size() >= targets) return;
+  source.spend(targets - weights.size(), sizeof(float), join(kind, " ", number, ": weights"));
+  weights.resize(targets);
+}
+
 void addNote(Model& model, std::size_t count, const char* what, const char* rest) {
   if (count > 0) model.notes.push_back(join(counted(count, what), rest));
 }
@@ -133,6 +141,12 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, const Load
     for (const double weight : from.weights) {
       mesh.morphWeights.push_back(static_cast<float>(weight));
     }
+    fillUp(source, "mesh", model.meshes.size() - 1, mesh.morphTargetCount, mesh.morphWeights);
+  }
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    Node& node = model.nodes[i];
+    if (node.mesh != none && !node.morphWeights.empty())
+      fillUp(source, "node", i, model.meshes[node.mesh].morphTargetCount, node.morphWeights);
   }
 
   const std::vector<bool> reachable = findReachable(source, model);

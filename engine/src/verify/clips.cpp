@@ -54,41 +54,67 @@ dquat toRotation(const dvec4& value) {
 
 enum class Part : std::size_t { inTangent = 0, value = 1, outTangent = 2 };
 
-dvec4 keyOf(const ChannelView& channel, std::size_t key, Part part) {
-  const glm::length_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+/// The number of a key that is `place` numbers behind the first.
+double numberOf(const ChannelView& channel, std::size_t width, std::size_t key, Part part,
+                std::size_t place) {
   if (channel.interpolation == Interpolation::cubicSpline)
     key = 3 * key + static_cast<std::size_t>(part);
-  dvec4 result(0.0);
-  for (glm::length_t i = 0; i < width; ++i) {
-    result[i] =
-        double{channel.values[key * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]};
-  }
-  return result;
+  return double{channel.values[key * width + place]};
 }
 
-/// glTF 2.0, appendix C.
-dvec4 valueAt(const ChannelView& channel, double time) {
+/// glTF 2.0, appendix C. `keyOf` gets a key and its part, `linear` two values and a fraction.
+template <typename KeyOf, typename Linear>
+auto interpolated(const ChannelView& channel, double time, KeyOf keyOf, Linear linear) {
   // The first key after the time. If a time has several keys, the last of them counts from then on.
   const auto after = std::upper_bound(channel.times.begin(), channel.times.end(), time,
                                       [](double at, float key) { return at < double{key}; });
   const auto next = static_cast<std::size_t>(after - channel.times.begin());
-  if (next == 0) return keyOf(channel, 0, Part::value);
-  const dvec4 from = keyOf(channel, next - 1, Part::value);
+  if (next == 0) return keyOf(0, Part::value);
+  const auto from = keyOf(next - 1, Part::value);
   if (next == channel.times.size() || channel.interpolation == Interpolation::step) return from;
 
-  const dvec4 to = keyOf(channel, next, Part::value);
+  const auto to = keyOf(next, Part::value);
   const double start = double{channel.times[next - 1]};
   const double distance = double{channel.times[next]} - start;
   const double s = (time - start) / distance;
   if (channel.interpolation == Interpolation::cubicSpline) {
     const double s2 = s * s, s3 = s2 * s;
     return (2 * s3 - 3 * s2 + 1) * from + (3 * s2 - 2 * s3) * to +
-           distance * (s3 - 2 * s2 + s) * keyOf(channel, next - 1, Part::outTangent) +
-           distance * (s3 - s2) * keyOf(channel, next, Part::inTangent);
+           distance * (s3 - 2 * s2 + s) * keyOf(next - 1, Part::outTangent) +
+           distance * (s3 - s2) * keyOf(next, Part::inTangent);
   }
-  if (channel.path != ChannelPath::rotation) return (1 - s) * from + s * to;
-  const dquat q = glm::slerp(toRotation(from), toRotation(to), s);  // along the shorter arc
-  return {q.x, q.y, q.z, q.w};
+  return linear(from, to, s);
+}
+
+dvec4 valueAt(const ChannelView& channel, double time) {
+  const bool isRotation = channel.path == ChannelPath::rotation;
+  const auto keyOf = [&](std::size_t key, Part part) {
+    dvec4 result(0.0);
+    for (std::size_t i = 0; i < (isRotation ? 4u : 3u); ++i)
+      result[static_cast<glm::length_t>(i)] = numberOf(channel, isRotation ? 4 : 3, key, part, i);
+    return result;
+  };
+  return interpolated(channel, time, keyOf, [&](const dvec4& from, const dvec4& to, double s) {
+    if (!isRotation) return (1 - s) * from + s * to;
+    const dquat q = glm::slerp(toRotation(from), toRotation(to), s);  // along the shorter arc
+    return dvec4(q.x, q.y, q.z, q.w);
+  });
+}
+
+/// The morph weight `number` of a node in a clip.
+double weightAt(const Skeleton& skeleton, std::uint32_t node, std::size_t number,
+                const ClipView& clip, double time) {
+  const std::span<const float> rest = skeleton.nodes[node].weights;
+  for (const ChannelView& channel : clip.channels) {
+    if (channel.node != node || channel.path != ChannelPath::weights) continue;
+    return interpolated(
+        channel, time,
+        [&](std::size_t key, Part part) {
+          return numberOf(channel, rest.size(), key, part, number);
+        },
+        [](double from, double to, double s) { return (1 - s) * from + s * to; });
+  }
+  return double{rest[number]};
 }
 
 Local restOf(const SkeletonNode& node) {
@@ -150,10 +176,12 @@ Error refused(std::string message) {
 Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clips) {
   for (const ClipView& clip : clips) {
     for (const ChannelView& channel : clip.channels) {
-      if (channel.path == ChannelPath::weights) continue;
-      const std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+      const bool isNode = channel.node < skeleton.nodes.size();
+      std::size_t width = channel.path == ChannelPath::rotation ? 4 : 3;
+      if (isNode && channel.path == ChannelPath::weights)
+        width = skeleton.nodes[channel.node].weights.size();
       const std::size_t parts = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
-      if (channel.node >= skeleton.nodes.size() || channel.times.empty() ||
+      if (!isNode || width == 0 || channel.times.empty() ||
           channel.values.size() != channel.times.size() * width * parts) {
         return refused("clip " + std::to_string(&clip - clips.data()) + ": channel " +
                        std::to_string(&channel - clip.channels.data()) +
@@ -389,13 +417,10 @@ std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
   return {atJoint, perDistance};
 }
 
-}  // namespace
-
-Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
-                               std::span<const std::span<const float>> masks,
-                               std::span<const ClipLayer> layers, std::uint32_t skin,
-                               const PackedClips* bank) {
-  if (const Result<void> checked = checkSkin(skeleton, skin); !checked) return checked.error();
+/// Checks clips, masks and layers.
+Result<std::vector<Layer>> toLayers(const Skeleton& skeleton, std::span<const ClipView> clips,
+                                    std::span<const std::span<const float>> masks,
+                                    std::span<const ClipLayer> layers) {
   if (const Result<void> checked = checkClips(skeleton, clips); !checked) return checked.error();
   for (const std::span<const float> mask : masks)
     if (mask.size() != skeleton.nodes.size()) return refused("a mask needs one factor per node");
@@ -408,6 +433,18 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
     if (!layer) return refused("layer " + std::to_string(index) + ": " + layer.error().message);
     resolved.push_back(*layer);
   }
+  return resolved;
+}
+
+}  // namespace
+
+Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
+                               std::span<const std::span<const float>> masks,
+                               std::span<const ClipLayer> layers, std::uint32_t skin,
+                               const PackedClips* bank) {
+  if (const Result<void> checked = checkSkin(skeleton, skin); !checked) return checked.error();
+  const Result<std::vector<Layer>> resolved = toLayers(skeleton, clips, masks, layers);
+  if (!resolved) return resolved.error();
   std::vector<std::uint32_t> parents;
   for (const SkeletonNode& node : skeleton.nodes)
     parents.push_back(node.parent < skeleton.nodes.size() ? node.parent : noJoint);
@@ -417,7 +454,7 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
   std::vector<PosedNode> nodes(parents.size());
   for (const std::uint32_t node : order) {
     const PosedNode above = parents[node] != noJoint ? nodes[parents[node]] : PosedNode();
-    nodes[node] = poseNode(skeleton, node, resolved, above, bank);
+    nodes[node] = poseNode(skeleton, node, *resolved, above, bank);
   }
   SampledPose pose;
   const SkeletonSkin& posedSkin = skeleton.skins[skin];
@@ -433,6 +470,46 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
     if (bank != nullptr) pose.bounds.push_back(boundOf(nodes, parents, joint, inverseBind));
   }
   return pose;
+}
+
+// The bank's weights are off by the `ClipError` e of the node, so their mean is, too. float32: as
+// for translations above.
+Result<SampledWeights> sampleWeights(const Skeleton& skeleton, std::span<const ClipView> clips,
+                                     std::span<const std::span<const float>> masks,
+                                     std::span<const ClipLayer> layers, std::uint32_t node,
+                                     const PackedClips* bank) {
+  const Result<std::vector<Layer>> resolved = toLayers(skeleton, clips, masks, layers);
+  if (!resolved) return resolved.error();
+  SampledWeights result;
+  if (node >= skeleton.nodes.size()) return result;
+  const double clipError = bank != nullptr ? double{bank->error(node).weight} : 0;
+  for (std::size_t number = 0; number < skeleton.nodes[node].weights.size(); ++number) {
+    const auto at = [&](const ClipView& clip, double time) {
+      return weightAt(skeleton, node, number, clip, time);
+    };
+    const double rest = double{skeleton.nodes[node].weights[number]};
+    double total = 0, sum = 0, sizes = 0;
+    for (const Layer& layer : *resolved) {
+      if (layer.clip->additive) continue;
+      const double factor = layer.factor(node), value = at(*layer.clip, layer.time);
+      total += factor;
+      sum += factor * value;
+      sizes += factor * std::abs(value);
+    }
+    double weight = total > 0 ? sum / total : rest;
+    double bound = total > 0 ? clipError + 16 * u * sizes / total : 0;
+    for (const Layer& layer : *resolved) {
+      if (!layer.clip->additive) continue;
+      const double base = layer.base != nullptr ? at(*layer.base, layer.baseTime) : rest;
+      const double factor = layer.factor(node), size = std::abs(factor);
+      const double difference = at(*layer.clip, layer.time) - base;
+      weight += factor * difference;
+      bound += size * clipError + 4 * u * (std::abs(weight) + size * std::abs(difference));
+    }
+    result.weights.push_back(weight);
+    if (bank != nullptr) result.bounds.push_back(bound);
+  }
+  return result;
 }
 
 }  // namespace dermis::reference

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "dermis/clips.h"
@@ -27,6 +28,7 @@ class BankCheck {
         !isSection(header.skins, header.skinCount * std::uint64_t{sizeof(BankSkin) / 4}) ||
         !isSection(header.clips, header.clipCount * std::uint64_t{sizeof(BankClip) / 4}) ||
         !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
+        !isSection(header.morphed, header.morphedCount * std::uint64_t{sizeof(BankMorphed) / 4}) ||
         header.clipCount > maxClips || header.maskCount > maxMasks || header.nodes % 4 != 0 ||
         header.clips % 4 != 0)
       return damagedBank("its header does not fit its sections");
@@ -35,6 +37,10 @@ class BankCheck {
     }
     for (std::size_t i = 0; i < header.skinCount; ++i) {
       if (!isSkin(bank_.skin(i))) return damagedBank("skin " + std::to_string(i) + " is not valid");
+    }
+    for (std::size_t i = 0; i < header.morphedCount; ++i) {
+      if (!isMorphed(bank_.morphed(i)))
+        return damagedBank("node with weights " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.clipCount; ++i) {
       if (!isClip(bank_.clip(i))) return damagedBank("clip " + std::to_string(i) + " is not valid");
@@ -73,6 +79,13 @@ class BankCheck {
     return true;
   }
 
+  bool isMorphed(const BankMorphed& node) const {
+    const std::uint64_t groups = node.groupCount();
+    return groups > 0 && groups + node.firstGroup <= bank_.header.groupCount &&
+           areFinite(node.rest, 3 * groups) && areFinite(node.masks, bank_.header.maskCount) &&
+           std::isfinite(node.error);
+  }
+
   bool isClass(const BankClass& keys) const {
     const KeyFormat format = KeyFormat::of(keys.format);
     const std::uint64_t columns = keys.columnCount, intervals = std::uint64_t{keys.keyCount} - 1;
@@ -102,7 +115,8 @@ class BankCheck {
   }
 
   bool isClip(const BankClip& clip) const {
-    const std::uint64_t tracks = std::uint64_t{3} * bank_.header.nodeCount;
+    const std::uint64_t ofNodes = std::uint64_t{3} * bank_.header.nodeCount;
+    const std::uint64_t tracks = ofNodes + bank_.header.groupCount;
     if (!std::isfinite(clip.duration) || clip.duration < 0 || !std::isfinite(clip.rate) ||
         clip.rate < 0 || clip.flags > 3 || clip.classCount > 256 ||
         !std::isfinite(clip.duration * clip.rate) || clip.classes % 4 != 0 ||
@@ -113,7 +127,7 @@ class BankCheck {
       if (!isClass(bank_.keyClass(clip, i))) return false;
     }
     for (std::size_t i = 0; i < tracks; ++i) {
-      if (!isTrack(clip, bank_.words[clip.tracks + i], i % 3 == 1)) return false;
+      if (!isTrack(clip, bank_.words[clip.tracks + i], i < ofNodes && i % 3 == 1)) return false;
     }
     return true;
   }
@@ -178,12 +192,22 @@ ClipInfo PackedClips::clip(std::uint32_t number) const {
   return {clip.duration, (clip.flags & 1) != 0, (clip.flags & 2) != 0};
 }
 
+std::uint32_t PackedClips::weightCount(std::uint32_t node) const {
+  const ClipBank bank(*this);
+  const std::optional<BankMorphed> found = bank.morphedNode(node);
+  return found ? found->count : 0;
+}
+
 ClipError PackedClips::error(std::uint32_t node) const {
   const ClipBank bank(*this);
+  ClipError error;
   for (std::size_t i = 0; i < bank.header.nodeCount; ++i) {
-    if (bank.node(i).source == node) return bank.node(i).error;
+    const BankNode found = bank.node(i);
+    if (found.source == node)
+      error = {found.translationError, found.rotationError, found.scaleError, 0};
   }
-  return {};
+  if (const std::optional<BankMorphed> found = bank.morphedNode(node)) error.weight = found->error;
+  return error;
 }
 
 }  // namespace dermis

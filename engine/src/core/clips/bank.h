@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
 
 #include "abi.h"
@@ -15,7 +16,7 @@
 namespace dermis {
 
 inline constexpr std::uint32_t clipsMagic = 0x504c4344u;  // "DCLP"
-inline constexpr std::uint32_t clipsVersion = 1;
+inline constexpr std::uint32_t clipsVersion = 2;
 inline constexpr std::uint32_t noNode = 0xffffffffu;
 
 /// The first four words are those of a packed mesh header, so that the checksum is computed in the
@@ -24,7 +25,9 @@ struct BankHeader {
   std::uint32_t magic, version, checksum, wordCount;
   std::uint32_t nodeCount, skinCount, clipCount, maskCount;
   std::uint32_t nodes, skins, clips, masks;  ///< `masks`: `nodeCount` factors for each
-  std::uint32_t unused[4];
+  std::uint32_t morphedCount, morphed;       ///< nodes with morph weights
+  std::uint32_t groupCount;                  ///< groups of three weights, of all these nodes
+  std::uint32_t unused;
 };
 
 /// A node that clips move. Parents come before their children.
@@ -33,7 +36,22 @@ struct BankNode {
   std::uint32_t source;  ///< node of the skeleton
   std::uint32_t fixed;   ///< 12 numbers: what is folded in, between the parent and this; 0: nothing
   float translation[3], rotation[4], scale[3];  ///< at rest
-  ClipError error;
+  float translationError, rotationError, scaleError;
+};
+
+/// A node with morph weights, whether or not it moves. Weight i is component i % 3 of the group
+/// `firstGroup` + i / 3. In a clip the track of group g is word 3 × `nodeCount` + g of its tracks,
+/// and is stored as one of a translation.
+struct BankMorphed {
+  std::uint32_t source;  ///< node of the skeleton
+  std::uint32_t count;   ///< weights, at least 1
+  std::uint32_t firstGroup;
+  std::uint32_t rest;   ///< 3 numbers for each group
+  std::uint32_t masks;  ///< for each mask the factor of the node
+  float error;          ///< of each weight
+  std::uint32_t unused[2];
+
+  std::uint32_t groupCount() const { return count / 3 + (count % 3 != 0 ? 1 : 0); }
 };
 
 struct BankSkin {
@@ -48,7 +66,8 @@ struct BankClip {
   std::uint32_t flags;   ///< wraps | 2 additive
   std::uint32_t classCount;
   std::uint32_t classes;
-  std::uint32_t tracks;  ///< for each node three words: translation, rotation, scale
+  std::uint32_t tracks;  ///< for each node three words: translation, rotation, scale; then for
+                         ///< each group of weights one
   std::uint32_t unused[2];
 };
 
@@ -179,6 +198,16 @@ struct ClipBank {
   }
   BankNode node(std::size_t i) const { return at<BankNode>(header.nodes + i * wordsOf<BankNode>); }
   BankSkin skin(std::size_t i) const { return at<BankSkin>(header.skins + i * wordsOf<BankSkin>); }
+  BankMorphed morphed(std::size_t i) const {
+    return at<BankMorphed>(header.morphed + i * wordsOf<BankMorphed>);
+  }
+  /// The one of a node of the skeleton, if it has weights.
+  std::optional<BankMorphed> morphedNode(std::uint32_t source) const {
+    for (std::size_t i = 0; i < header.morphedCount; ++i) {
+      if (const BankMorphed found = morphed(i); found.source == source) return found;
+    }
+    return std::nullopt;
+  }
   BankClip clip(std::size_t i) const { return at<BankClip>(header.clips + i * wordsOf<BankClip>); }
   BankClass keyClass(const BankClip& clip, std::size_t i) const {
     return at<BankClass>(clip.classes + i * wordsOf<BankClass>);
@@ -214,7 +243,7 @@ static_assert(offsetof(BankHeader, nodes) == abi::CLIPS_OFFSETS * 4 &&
               sizeof(BankClass) == abi::CLIP_CLASS_WORDS * 4 &&
               trackColumnBits == abi::TRACK_COLUMN_BITS);
 static_assert(sizeof(BankHeader) == 64 && sizeof(BankNode) == 64 && sizeof(BankSkin) == 16 &&
-              sizeof(BankClip) == 32 && sizeof(BankClass) == 32);
+              sizeof(BankMorphed) == 32 && sizeof(BankClip) == 32 && sizeof(BankClass) == 32);
 
 /// Checks the length, the version, the checksum, every offset and index, and that numbers are
 /// finite. O(words).

@@ -30,6 +30,8 @@ class BankWriter {
     reserve(sizeof(header) / 4);
     header.nodes = reserve(parts_.moved.size() * sizeof(BankNode) / 4);
     header.skins = reserve(parts_.skeleton.skins.size() * sizeof(BankSkin) / 4);
+    header.morphedCount = static_cast<std::uint32_t>(parts_.morphed.size());
+    header.morphed = reserve(parts_.morphed.size() * sizeof(BankMorphed) / 4);
     header.clips = reserve(parts_.clips.size() * sizeof(BankClip) / 4);
     header.masks = reserve(parts_.masks.size() * parts_.moved.size());
     for (std::size_t mask = 0; mask < parts_.masks.size(); ++mask) {
@@ -42,6 +44,10 @@ class BankWriter {
       writeNode(header.nodes + 16 * i, parts_.moved[i]);
     for (std::size_t i = 0; i < parts_.skeleton.skins.size(); ++i)
       writeSkin(header.skins + 4 * i, parts_.skeleton.skins[i]);
+    for (std::size_t i = 0; i < parts_.morphed.size(); ++i) {
+      writeMorphed(header.morphed + 8 * i, parts_.morphed[i]);
+      header.groupCount += static_cast<std::uint32_t>(parts_.morphed[i].rest.size());
+    }
     for (std::size_t i = 0; i < parts_.clips.size(); ++i) {
       writeClip(header.clips + 8 * i, i, report);
       if (words_.size() > 0x3fffffff)
@@ -88,6 +94,24 @@ class BankWriter {
       record.rotation[i] = static_cast<float>(node.rest[1][i]);
       if (i < 3) record.scale[i] = static_cast<float>(node.rest[2][i]);
     }
+    record.translationError = node.error.translation;
+    record.rotationError = node.error.rotation;
+    record.scaleError = node.error.scale;
+    put(offset, record);
+  }
+
+  void writeMorphed(std::size_t offset, const MorphedNode& node) {
+    BankMorphed record{};
+    record.source = node.source;
+    record.count = static_cast<std::uint32_t>(parts_.skeleton.nodes[node.source].weights.size());
+    record.firstGroup = node.firstGroup;
+    record.rest = reserve(3 * node.rest.size());
+    for (std::size_t i = 0; i < 3 * node.rest.size(); ++i)
+      words_[record.rest + i] =
+          std::bit_cast<std::uint32_t>(static_cast<float>(node.rest[i / 3][i % 3]));
+    record.masks = reserve(parts_.masks.size());
+    for (std::size_t mask = 0; mask < parts_.masks.size(); ++mask)
+      words_[record.masks + mask] = std::bit_cast<std::uint32_t>(parts_.masks[mask][node.source]);
     record.error = node.error;
     put(offset, record);
   }
@@ -106,26 +130,30 @@ class BankWriter {
 
   void writeClip(std::size_t offset, std::size_t number, PackClipsReport& report) {
     const FittedClip& clip = parts_.fitted[number];
+    std::vector<const Track*> tracks;  // in the order of their words
+    for (const std::array<Track, 3>& ofNode : clip.tracks) {
+      for (const Track& track : ofNode) tracks.push_back(&track);
+    }
+    for (const Track& track : clip.weightTracks) tracks.push_back(&track);
     int finest = 20;
-    for (const auto& tracks : clip.tracks) {
-      for (const Track& track : tracks) {
-        if (track.kind == TrackKind::animated) finest = std::min(finest, track.level);
-      }
+    for (const Track* track : tracks) {
+      if (track->kind == TrackKind::animated) finest = std::min(finest, track->level);
     }
     BankClip record{};
     record.duration = static_cast<float>(parts_.clips[number].duration);
     record.rate = static_cast<float>(clip.rate / std::ldexp(1, finest));
     record.flags =
         (parts_.clips[number].wraps ? 1u : 0u) | (parts_.clips[number].additive ? 2u : 0u);
-    record.tracks = reserve(3 * clip.tracks.size());
+    record.tracks = reserve(tracks.size());
 
     using Columns = std::vector<std::pair<std::size_t, const Track*>>;  // word of `tracks`
     std::map<std::tuple<int, std::uint32_t, bool>, Columns> classes;
-    for (std::size_t i = 0; i < 3 * clip.tracks.size(); ++i) {
-      const Track& track = clip.tracks[i / 3][i % 3];
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      const Track& track = *tracks[i];
       if (track.kind == TrackKind::constant) {
-        const std::uint32_t value = reserve(i % 3 == 1 ? 4 : 3);
-        for (std::size_t c = 0; c < (i % 3 == 1 ? 4u : 3u); ++c)
+        const std::size_t width = i % 3 == 1 && i < 3 * clip.tracks.size() ? 4 : 3;
+        const std::uint32_t value = reserve(width);
+        for (std::size_t c = 0; c < width; ++c)
           words_[value + c] = std::bit_cast<std::uint32_t>(track.constant[c]);
         words_[record.tracks + i] = trackWord(TrackKind::constant, value);
         ++report.constantTracks;

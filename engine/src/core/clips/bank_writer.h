@@ -29,6 +29,14 @@ struct MovedNode {
   ClipError error{};
 };
 
+/// A node with morph weights.
+struct MorphedNode {
+  std::uint32_t source;
+  std::uint32_t firstGroup;  ///< of its groups of three weights, the last filled up with zeros
+  std::vector<Value> rest;   ///< of each group
+  float error = 0;           ///< of each weight
+};
+
 /// Where something that no clip moves hangs.
 struct Hanging {
   std::uint32_t node = noNode;  ///< of the bank
@@ -38,6 +46,7 @@ struct Hanging {
 struct FittedClip {
   double rate = 1;
   std::vector<std::array<Track, 3>> tracks;  ///< of each node
+  std::vector<Track> weightTracks;           ///< of each group of weights
 };
 
 struct BankParts {
@@ -45,6 +54,7 @@ struct BankParts {
   std::span<const ClipView> clips;
   std::span<const std::span<const float>> masks;
   std::span<const MovedNode> moved;
+  std::span<const MorphedNode> morphed;
   std::span<const Hanging> hanging;  ///< of each node of the skeleton
   std::span<const FittedClip> fitted;
 };

@@ -32,6 +32,7 @@ Result<void> checkNodes(const std::vector<SkeletonNode>& nodes) {
         areFinite(node.translation) && areFinite(node.rotation) && areFinite(node.scale);
     if (node.matrix)
       isFinite = isFinite && std::ranges::all_of(*node.matrix, areFinite<std::array<double, 4>>);
+    isFinite = isFinite && areFinite(node.weights);
     if (!isFinite) return invalid(title + " has a number that is not finite");
     if (std::ranges::all_of(node.rotation, [](double number) { return number == 0; }))
       return invalid(title + " has the rotation 0");
@@ -73,6 +74,12 @@ Result<void> checkSkins(const Skeleton& skeleton) {
   return {};
 }
 
+/// Numbers of a value.
+std::size_t widthOf(ChannelPath path, const SkeletonNode& node) {
+  if (path == ChannelPath::weights) return node.weights.size();
+  return path == ChannelPath::rotation ? 4 : 3;
+}
+
 Result<void> checkChannel(const Skeleton& skeleton, const ChannelView& channel,
                           const std::string& clip) {
   if (channel.node >= skeleton.nodes.size()) {
@@ -83,10 +90,12 @@ Result<void> checkChannel(const Skeleton& skeleton, const ChannelView& channel,
   const std::string title = clip + ": " + titled("node", channel.node, node.name);
   if (channel.path > ChannelPath::weights || channel.interpolation > Interpolation::cubicSpline)
     return invalid(title + ": the path or the interpolation is no value of its type");
-  if (channel.path == ChannelPath::weights) return {};
-  if (node.matrix) return invalid(title + " has a matrix, so it cannot be animated");
-  const std::size_t width = (channel.path == ChannelPath::rotation ? 4u : 3u) *
-                            (channel.interpolation == Interpolation::cubicSpline ? 3u : 1u);
+  const bool isWeights = channel.path == ChannelPath::weights;
+  if (isWeights && node.weights.empty())
+    return invalid(title + " has no weights, so they cannot be animated");
+  if (node.matrix && !isWeights) return invalid(title + " has a matrix, so it cannot be animated");
+  const std::size_t width =
+      widthOf(channel.path, node) * (channel.interpolation == Interpolation::cubicSpline ? 3u : 1u);
   if (channel.times.empty() || channel.values.size() != channel.times.size() * width) {
     return invalid(title + " has " + std::to_string(channel.times.size()) + " key times and " +
                    std::to_string(channel.values.size()) + " numbers: " + std::to_string(width) +
@@ -120,7 +129,7 @@ Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clip
     for (const ChannelView& channel : clip.channels) {
       if (Result<void> good = checkChannel(skeleton, channel, title); !good) return good;
       const auto property = std::uint64_t{channel.node} << 2 | static_cast<unsigned>(channel.path);
-      if (channel.path != ChannelPath::weights && !seen.insert(property).second)
+      if (!seen.insert(property).second)
         return invalid(title + " has two channels for one property of " +
                        titled("node", channel.node, skeleton.nodes[channel.node].name));
     }
@@ -160,6 +169,8 @@ Result<void> checkClipInput(const Skeleton& skeleton, std::span<const ClipView> 
                             const PackClipsOptions& options) {
   if (!std::isfinite(options.maxError) || options.maxError < 0)
     return invalid("maxError is not finite, or negative");
+  if (!std::isfinite(options.maxWeightError) || options.maxWeightError < 0)
+    return invalid("maxWeightError is not finite, or negative");
   if (Result<void> good = checkNodes(skeleton.nodes); !good) return good;
   if (Result<void> good = checkSkins(skeleton); !good) return good;
   if (!options.meshes.empty() && options.meshes.size() != skeleton.skins.size()) {

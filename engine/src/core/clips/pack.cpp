@@ -76,6 +76,7 @@ class Packer {
   Result<std::vector<std::uint32_t>> pack(PackClipsReport& report) {
     findChannels();
     findMovedNodes();
+    findMorphedNodes();
     measureReach();
     report.maxError = maxError_;
     for (std::size_t i = 0; i < clips_.size(); ++i) {
@@ -83,7 +84,8 @@ class Packer {
       if (!packed) return packed.error();
       packed_.push_back(*std::move(packed));
     }
-    return writeBank({skeleton_, clips_, options_.masks, moved_, hanging_, packed_}, report);
+    return writeBank({skeleton_, clips_, options_.masks, moved_, morphed_, hanging_, packed_},
+                     report);
   }
 
  private:
@@ -92,10 +94,9 @@ class Packer {
     channels_.resize(clips_.size());
     for (std::size_t i = 0; i < clips_.size(); ++i) {
       for (ChannelView channel : clips_[i].channels) {
-        if (channel.path == ChannelPath::weights) continue;
         if (channel.path == ChannelPath::rotation &&
             channel.interpolation != Interpolation::cubicSpline) {
-          std::vector<float>& values = normalizedKeys_.emplace_back();
+          std::vector<float>& values = changedKeys_.emplace_back();
           for (std::size_t key = 0; key < channel.values.size(); key += 4) {
             Value rotation;
             std::ranges::copy(channel.values.subspan(key, 4), rotation.begin());
@@ -130,7 +131,7 @@ class Packer {
     std::vector<bool> isMoved(nodes.size());
     for (const auto& channels : channels_) {
       for (const auto& [property, channel] : channels) {
-        if (moves(channel)) isMoved[channel.node] = true;
+        if (channel.path != ChannelPath::weights && moves(channel)) isMoved[channel.node] = true;
       }
     }
     hanging_.resize(nodes.size());
@@ -147,6 +148,19 @@ class Packer {
       } else {
         hanging_[i] = {above.node, multiply(above.fixed, local)};
       }
+    }
+  }
+
+  /// Their weights are packed in groups of three, like translations.
+  void findMorphedNodes() {
+    std::uint32_t groups = 0;
+    for (std::uint32_t i = 0; i < skeleton_.nodes.size(); ++i) {
+      const std::span<const float> weights = skeleton_.nodes[i].weights;
+      if (weights.empty()) continue;
+      MorphedNode& node = morphed_.emplace_back(MorphedNode{i, groups, {}});
+      node.rest.resize((weights.size() + 2) / 3);
+      for (std::size_t k = 0; k < weights.size(); ++k) node.rest[k / 3][k % 3] = double{weights[k]};
+      groups += static_cast<std::uint32_t>(node.rest.size());
     }
   }
 
@@ -241,6 +255,12 @@ class Packer {
     return std::min(1 / closest, 120.0);
   }
 
+  /// The time in the base of an additive clip.
+  double baseTimeOf(const ClipView& clip) const {
+    const ClipInfo info{static_cast<float>(clips_[clip.baseClip].duration)};
+    return double{clipTime(info, clip.baseTime, true)};
+  }
+
   std::vector<std::array<Curve, 3>> curvesOf(std::size_t number) const {
     const ClipView& clip = clips_[number];
     std::vector<std::array<Curve, 3>> curves(moved_.size());
@@ -251,10 +271,8 @@ class Packer {
         if (clip.additive) {
           base = rest;
           if (clip.baseClip < clips_.size()) {
-            const ClipInfo info{static_cast<float>(clips_[clip.baseClip].duration)};
-            const double time = double{clipTime(info, clip.baseTime, true)};
             base = Curve(channelOf(clip.baseClip, moved_[i].source, paths[p]), paths[p], rest, {})
-                       .at(time);
+                       .at(baseTimeOf(clip));
           }
         }
         curves[i][p] = Curve(channelOf(number, moved_[i].source, paths[p]), paths[p], rest, base);
@@ -263,12 +281,56 @@ class Packer {
     return curves;
   }
 
+  /// The channel of the weights of a node in a clip for three of them, as if of a translation.
+  std::optional<ChannelView> groupChannel(std::size_t clip, const MorphedNode& node,
+                                          std::size_t group) {
+    const ChannelView* const all = channelOf(clip, node.source, ChannelPath::weights);
+    if (all == nullptr) return std::nullopt;
+    const std::size_t count = skeleton_.nodes[node.source].weights.size();
+    std::vector<float>& values = changedKeys_.emplace_back();
+    for (std::size_t first = 0; first < all->values.size(); first += count) {
+      for (std::size_t k = 3 * group; k < 3 * group + 3; ++k)
+        values.push_back(k < count ? all->values[first + k] : 0);
+    }
+    ChannelView channel = *all;
+    channel.path = ChannelPath::translation;
+    channel.values = values;
+    return channel;
+  }
+
+  Result<void> packWeights(std::size_t number, double duration, FittedClip& packed) {
+    const ClipView& clip = clips_[number];
+    const double tolerance = options_.maxWeightError > 0 ? options_.maxWeightError : 1e-3;
+    for (MorphedNode& node : morphed_) {
+      for (std::size_t group = 0; group < node.rest.size(); ++group) {
+        const Value& rest = node.rest[group];
+        std::optional<Value> base;
+        if (clip.additive) {
+          base = rest;
+          if (clip.baseClip < clips_.size()) {
+            const auto channel = groupChannel(clip.baseClip, node, group);
+            base = Curve(channel ? &*channel : nullptr, ChannelPath::translation, rest, {})
+                       .at(baseTimeOf(clip));
+          }
+        }
+        const auto channel = groupChannel(number, node, group);
+        const Curve curve(channel ? &*channel : nullptr, ChannelPath::translation, rest, base);
+        std::optional<Track> track =
+            fitTrack(curve, clip.additive ? Value{} : rest, duration, packed.rate, tolerance);
+        if (!track)
+          return unkept(where(number, node.source), "maxWeightError", tolerance, packed.rate);
+        node.error = std::max(node.error, static_cast<float>(track->error * (1 + 0x1p-23)));
+        packed.weightTracks.push_back(*std::move(track));
+      }
+    }
+    return {};
+  }
+
   const Local& stillOf(std::size_t clip, std::size_t node) const {
     return clips_[clip].additive ? noDifference : moved_[node].rest;
   }
 
-  std::string where(std::size_t clip, std::size_t node) const {
-    const std::uint32_t source = moved_[node].source;
+  std::string where(std::size_t clip, std::uint32_t source) const {
     return titled("clip", clip, clips_[clip].name) + ", " +
            titled("node", source, skeleton_.nodes[source].name);
   }
@@ -293,14 +355,16 @@ class Packer {
         for (std::size_t p = 0; p < 3; ++p) {
           std::optional<Track> track =
               fitTrack(curves[i][p], stillOf(number, i)[p], duration, packed.rate, tolerances[p]);
-          if (!track) return unkept(number, i, packed.rate);
+          if (!track)
+            return unkept(where(number, moved_[i].source), "maxError", maxError_, packed.rate);
           packed.tracks[i][p] = *std::move(track);
         }
       }
       worst = errorOf(number, packed, curves, duration, worstNode, worstTime);
       if (worst <= maxError_) break;
     }
-    if (!(worst <= maxError_)) return unkept(number, worstNode, packed.rate);
+    if (!(worst <= maxError_))
+      return unkept(where(number, moved_[worstNode].source), "maxError", maxError_, packed.rate);
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       float* const errors[] = {&moved_[i].error.translation, &moved_[i].error.rotation,
                                &moved_[i].error.scale};
@@ -311,14 +375,15 @@ class Packer {
     }
     if (worst > report.worstError) {
       report.worstError = worst;
-      report.worst = where(number, worstNode) + ", at " + decimal(worstTime) + " s";
+      report.worst = where(number, moved_[worstNode].source) + ", at " + decimal(worstTime) + " s";
     }
+    if (Result<void> good = packWeights(number, duration, packed); !good) return good.error();
     return packed;
   }
 
-  Error unkept(std::size_t clip, std::size_t node, double rate) const {
-    return {ErrorCode::limitExceeded, "packClips: " + where(clip, node) + ": maxError " +
-                                          decimal(maxError_) + " cannot be kept with at most " +
+  static Error unkept(const std::string& where, const char* option, double error, double rate) {
+    return {ErrorCode::limitExceeded, "packClips: " + where + ": " + option + " " + decimal(error) +
+                                          " cannot be kept with at most " +
                                           decimal(std::ldexp(rate, -finestLevel)) +
                                           " keys a second"};
   }
@@ -433,8 +498,9 @@ class Packer {
   std::span<const ClipView> clips_;
   const PackClipsOptions& options_;
   std::vector<std::map<std::pair<std::uint32_t, ChannelPath>, ChannelView>> channels_;
-  std::deque<std::vector<float>> normalizedKeys_;  ///< which `channels_` point to
+  std::deque<std::vector<float>> changedKeys_;  ///< which channels point to
   std::vector<MovedNode> moved_;
+  std::vector<MorphedNode> morphed_;
   std::vector<Hanging> hanging_;        ///< of each node of the skeleton
   std::vector<Transform> restGlobals_;  ///< of each node of the skeleton
   double maxError_ = 0;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -74,18 +75,17 @@ Float4 sampleKeys(const ClipBank& bank, const Layer& layer, std::uint32_t word) 
   return mix(vectorOf(from, range), 1 - fraction, vectorOf(to, range), fraction);
 }
 
-Float4 sampleTrack(const ClipBank& bank, const Layer& layer, std::size_t node, ChannelPath path,
+/// `track`: its place in the tracks of the clip.
+Float4 sampleTrack(const ClipBank& bank, const Layer& layer, std::size_t track, bool isRotation,
                    const Float4& rest) {
-  const std::uint32_t word =
-      bank.words[layer.clip.tracks + 3 * node + static_cast<std::size_t>(path)];
+  const std::uint32_t word = bank.words[layer.clip.tracks + track];
   switch (static_cast<TrackKind>(word >> 30)) {
     case TrackKind::rest:
       return rest;
     case TrackKind::constant: {
       Float4 value{};
       const std::size_t offset = word & 0x3fffffff;
-      for (std::size_t i = 0; i < (path == ChannelPath::rotation ? 4u : 3u); ++i)
-        value[i] = bank.number(offset + i);
+      for (std::size_t i = 0; i < (isRotation ? 4u : 3u); ++i) value[i] = bank.number(offset + i);
       return value;
     }
     case TrackKind::animated:
@@ -96,9 +96,9 @@ Float4 sampleTrack(const ClipBank& bank, const Layer& layer, std::size_t node, C
 
 LocalTransform sampleLocal(const ClipBank& bank, const Layer& layer, std::size_t node,
                            const LocalTransform& rest) {
-  return {sampleTrack(bank, layer, node, ChannelPath::translation, rest.translation),
-          sampleTrack(bank, layer, node, ChannelPath::rotation, rest.rotation),
-          sampleTrack(bank, layer, node, ChannelPath::scale, rest.scale)};
+  return {sampleTrack(bank, layer, 3 * node, false, rest.translation),
+          sampleTrack(bank, layer, 3 * node + 1, true, rest.rotation),
+          sampleTrack(bank, layer, 3 * node + 2, false, rest.scale)};
 }
 
 bool isAdditive(const Layer& layer) {
@@ -231,15 +231,25 @@ float clipTime(const ClipInfo& info, double seconds, bool hold) {
   return static_cast<float>(std::clamp(time, 0.0, duration));
 }
 
-void sampleNodes(const PackedClips& clips, const PackedLayers& packed,
-                 std::span<Affine<float>> globals) {
-  const ClipBank bank(clips);
-  std::array<Layer, maxClipLayers> storage;
+namespace {
+
+using Layers = std::array<Layer, maxClipLayers>;
+
+std::span<const Layer> unpacked(const ClipBank& bank, const PackedLayers& packed, Layers& storage) {
   for (std::uint32_t i = 0; i < packed.count; ++i) {
     const PackedLayer& layer = packed.layers[i];
     storage[i] = {bank.clip(layer.clip()), layer.time, fromHalf(layer.weight()), layer.mask()};
   }
-  const std::span<const Layer> layers = std::span(storage).first(packed.count);
+  return std::span(storage).first(packed.count);
+}
+
+}  // namespace
+
+void sampleNodes(const PackedClips& clips, const PackedLayers& packed,
+                 std::span<Affine<float>> globals) {
+  const ClipBank bank(clips);
+  Layers storage;
+  const std::span<const Layer> layers = unpacked(bank, packed, storage);
   for (std::size_t i = 0; i < globals.size(); ++i) {
     const BankNode node = bank.node(i);
     const LocalTransform rest{
@@ -269,6 +279,52 @@ void poseSkin(const PackedClips& clips, std::uint32_t number,
     pose[joint] =
         std::bit_cast<JointMatrix>(node == noNode ? matrix : multiply(globals[node], matrix));
   }
+}
+
+void sampleWeights(const PackedClips& clips, const PackedLayers& packed, const BankMorphed& node,
+                   std::span<float> weights) {
+  const ClipBank bank(clips);
+  Layers storage;
+  const std::span<const Layer> layers = unpacked(bank, packed, storage);
+  std::array<float, maxClipLayers> factors{};
+  float sum = 0;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const std::uint32_t mask = layers[i].mask;
+    factors[i] =
+        layers[i].weight * (mask == 0 ? 1 : bank.number(node.masks + std::size_t{mask} - 1));
+    if (!isAdditive(layers[i])) sum = sum + factors[i];
+  }
+  for (std::size_t group = 0; group < node.groupCount(); ++group) {
+    const std::size_t at = node.rest + 3 * group;
+    const std::size_t track = std::size_t{3} * bank.header.nodeCount + node.firstGroup + group;
+    const Float4 rest{bank.number(at), bank.number(at + 1), bank.number(at + 2), 0};
+    Float4 result = sum > 0 ? Float4{} : rest;
+    for (std::size_t i = 0; i < layers.size() && sum > 0; ++i) {
+      if (isAdditive(layers[i]) || !(factors[i] > 0)) continue;
+      result = mix(result, 1, sampleTrack(bank, layers[i], track, false, rest), factors[i] / sum);
+    }
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      if (isAdditive(layers[i]))
+        result = mix(result, 1, sampleTrack(bank, layers[i], track, false, {}), factors[i]);
+    }
+    const std::span<float> target = weights.subspan(3 * group);
+    std::copy_n(result.begin(), std::min<std::size_t>(target.size(), 3), target.begin());
+  }
+}
+
+Result<void> sampleWeights(const PackedClips& clips, std::span<const ClipLayer> layers,
+                           std::uint32_t node, std::span<float> weights) {
+  if (weights.size() != clips.weightCount(node)) {
+    return Error{ErrorCode::invalidArgument, "sampleWeights: there are " +
+                                                 std::to_string(weights.size()) +
+                                                 " weights, but node " + std::to_string(node) +
+                                                 " has " + std::to_string(clips.weightCount(node))};
+  }
+  const Result<PackedLayers> packed = packLayers(clips, layers, "sampleWeights: ");
+  if (!packed) return packed.error();
+  if (const std::optional<BankMorphed> found = ClipBank(clips).morphedNode(node))
+    sampleWeights(clips, *packed, *found, weights);
+  return {};
 }
 
 Result<void> samplePose(const PackedClips& clips, std::span<const ClipLayer> layers,

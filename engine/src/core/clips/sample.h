@@ -43,6 +43,10 @@ std::vector<bool> rigidSkins(const PackedClips& clips);
 DERMIS_CORE_API void sampleNodes(const PackedClips& clips, const PackedLayers& layers,
                                  std::span<Affine<float>> globals);
 
+/// Samples the morph weights of a node of the bank: `node.count` of them.
+DERMIS_CORE_API void sampleWeights(const PackedClips& clips, const PackedLayers& layers,
+                                   const BankMorphed& node, std::span<float> weights);
+
 /// Computes the pose of a skin from the transforms of the nodes.
 DERMIS_CORE_API void poseSkin(const PackedClips& clips, std::uint32_t skin,
                               std::span<const Affine<float>> globals, std::span<JointMatrix> pose);
