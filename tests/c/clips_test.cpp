@@ -9,6 +9,7 @@
 #include "c_helpers.h"
 #include "dermis/clips.h"
 #include "dermis/gltf.h"
+#include "test_data.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -127,6 +128,71 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
       dermis_sample_pose(bank, layers.data(), 2, 1, joints.data(), primitive.joint_count, &error),
       "there is no skin 1");
   expectError(dermis_sample_pose(bank, nullptr, 2, 0, joints.data(), 1, &error), "layers is null");
+}
+
+TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
+  const std::array<float, 4> rest{0, 0.25f, 0.5f, 1}, times{0, 0.5f, 1, 2};
+  std::array<float, 16> values{};
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i * i % 7);
+  std::vector<dermis_node> nodes(source.nodes, source.nodes + source.node_count);
+  nodes[1].weights = rest.data();
+  nodes[1].weight_count = 4;
+  dermis_channel channel = sized<dermis_channel>();
+  channel.node = 1;
+  channel.path = DERMIS_CHANNEL_WEIGHTS;
+  channel.interpolation = DERMIS_INTERPOLATION_LINEAR;
+  channel.times = times.data();
+  channel.values = values.data();
+  channel.key_count = 4;
+  channel.value_count = 16;
+  dermis_clip_view clip = sized<dermis_clip_view>();
+  clip.duration = 2;
+  clip.channels = &channel;
+  clip.channel_count = 1;
+  source.nodes = nodes.data();
+  source.clips = &clip;
+  source.clip_count = 1;
+  source.max_weight_error = 0.01;
+  skeleton.nodes[1].weights = rest;
+  clips.resize(1);
+  clips[0] = {.duration = 2, .channels = {}};
+  clips[0].channels = {
+      {1, ChannelPath::weights, Interpolation::linear, std::span(times), std::span(values)}};
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank, {.maxWeightError = 0.01});
+  const dermis_clip_layer layer{0.7, 1, 0, 0, 0};
+  const ClipLayer sameLayer{0, 0.7};
+  std::array<float, 4> weights{}, expectedWeights{};
+  expectOk(dermis_sample_weights(bank, &layer, 1, 1, weights.data(), 4, &error));
+  must(sampleWeights(same, {&sameLayer, 1}, 1, expectedWeights));
+  EXPECT_EQ(weights, expectedWeights);
+  EXPECT_NE(weights, rest);
+  expectError(dermis_sample_weights(bank, &layer, 1, 1, weights.data(), 3, &error),
+              "there are 3 weights, but node 1 has 4");
+  expectError(dermis_sample_weights(bank, &layer, 1, 1, nullptr, 4, &error), "weights is null");
+
+  // A source of a model has the weights at rest.
+  gltf::Model morphed;
+  Owned<dermis_model> owner;
+  if (const auto data = testDataFolder()) {
+    const std::string path =
+        (*data / "AnimatedMorphCube/glTF-Binary/AnimatedMorphCube.glb").string();
+    dermis_model_source file = sized<dermis_model_source>();
+    file.path = path.c_str();
+    expectOk(dermis_model_load(&file, &owner, &error));
+    dermis_clips_source of = sized<dermis_clips_source>();
+    expectOk(dermis_model_clips(owner, &of, &error));
+    morphed = must(gltf::load(path));
+    const Skeleton views = gltf::skeleton(morphed);
+    std::uint32_t count = 0;
+    for (std::uint32_t node = 0; node < of.node_count; ++node) {
+      ASSERT_EQ(of.nodes[node].weight_count, views.nodes[node].weights.size());
+      count += of.nodes[node].weight_count;
+      EXPECT_TRUE(isSame(of.nodes[node].weights, views.nodes[node].weights.data(),
+                         views.nodes[node].weights.size_bytes()));
+    }
+    EXPECT_GT(count, 0u);
+  }
 }
 
 TEST_F(CClipsTest, ZerosAreTheDefaultsOfANode) {

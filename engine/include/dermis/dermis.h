@@ -975,7 +975,7 @@ typedef enum dermis_channel_path {
   DERMIS_CHANNEL_TRANSLATION = 0,
   DERMIS_CHANNEL_ROTATION = 1,
   DERMIS_CHANNEL_SCALE = 2,
-  DERMIS_CHANNEL_WEIGHTS = 3,             // is not packed
+  DERMIS_CHANNEL_WEIGHTS = 3,             // morph weights
   DERMIS_CHANNEL_PATH_INT32 = 0x7fffffff  // not a value
 } dermis_channel_path;
 
@@ -989,6 +989,8 @@ typedef struct dermis_node {
   double scale[3];     // 0 0 0 counts as 1 1 1
   const double*
       matrix;  // or null. 3 rows of 4, in place of the three above; no clip may animate it
+  const float* weights;   // morph weights at rest
+  uint32_t weight_count;  // as its mesh has morph targets
 } dermis_node;
 // The joints of a skin, as a pose has them.
 typedef struct dermis_skin {
@@ -1005,8 +1007,8 @@ typedef struct dermis_channel {
   dermis_channel_path path;
   dermis_interpolation interpolation;
   const float* times;  // seconds, not descending. If two are equal, the value jumps there
-  // 3 for each key, or 4 for rotations; three times as many for splines: in-tangent, value,
-  // out-tangent.
+  // 3 for each key, or 4 for rotations, or for weights as many as the node has; three times as many
+  // for splines: in-tangent, value, out-tangent.
   const float* values;
   uint32_t key_count;    // at least 1
   uint32_t value_count;  // numbers
@@ -1035,6 +1037,7 @@ typedef struct dermis_clips_source {
   // extent of the skeleton.
   double max_error;
   const dermis_mesh_view* meshes;  // of each skin: how far it reaches; null: as far as its joints
+  double max_weight_error;         // how far a morph weight may be from the clips'; 0: 1/1000
 } dermis_clips_source;
 // Lists the skeleton and the clips of a model, as a source that the caller may change. It is valid
 // as long as the model.
@@ -1085,6 +1088,11 @@ DERMIS_C_API dermis_code dermis_sample_pose(const dermis_bank* bank,
                                             const dermis_clip_layer* layers, uint32_t layer_count,
                                             uint32_t skin, dermis_joint* joints,
                                             uint32_t joint_count, dermis_error* error);
+// Samples the morph weights of a node of the skeleton in the same way: as many as were packed.
+DERMIS_C_API dermis_code dermis_sample_weights(const dermis_bank* bank,
+                                               const dermis_clip_layer* layers,
+                                               uint32_t layer_count, uint32_t node, float* weights,
+                                               uint32_t weight_count, dermis_error* error);
 
 // Adds a bank to a scene, which keeps its bytes: it may then be destroyed.
 DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank,

@@ -39,6 +39,7 @@ SkeletonNode nodeOf(const dermis_node& node) {
   std::copy_n(node.translation, 3, result.translation.begin());
   if (!isZero(node.rotation)) std::copy_n(node.rotation, 4, result.rotation.begin());
   if (!isZero(node.scale)) std::copy_n(node.scale, 3, result.scale.begin());
+  result.weights = array(node.weights, node.weight_count, "a node's weights");
   if (node.matrix == nullptr) return result;
   Transform& matrix = result.matrix.emplace();
   for (std::size_t i = 0; i < 12; ++i) matrix[i / 4][i % 4] = node.matrix[i];
@@ -89,6 +90,7 @@ struct Source {
       masks.push_back(all.subspan(mask * nodes, nodes));
     options.masks = masks;
     options.maxError = source.max_error;
+    options.maxWeightError = source.max_weight_error;
     if (source.meshes == nullptr) return;
     const std::size_t stride = source.meshes->size;
     for (std::uint32_t skin = 0; skin < source.skin_count; ++skin) {
@@ -129,6 +131,8 @@ ClipsForCaller::ClipsForCaller(const Skeleton& skeleton, std::span<const ClipVie
     std::ranges::copy(node.translation, result.translation);
     std::ranges::copy(node.rotation, result.rotation);
     std::ranges::copy(node.scale, result.scale);
+    result.weights = node.weights.data();
+    result.weight_count = static_cast<std::uint32_t>(node.weights.size());
     if (!node.matrix) continue;
     result.matrix = matrices_.emplace_back(*node.matrix)[0].data();
   }
@@ -215,6 +219,17 @@ dermis_code dermis_sample_pose(const dermis_bank* bank, const dermis_clip_layer*
     const std::span<dermis_joint> results = array(joints, joint_count, "joints");
     must(samplePose(required(bank, "bank").clips, all, skin,
                     {reinterpret_cast<JointMatrix*>(results.data()), results.size()}));
+  });
+}
+
+dermis_code dermis_sample_weights(const dermis_bank* bank, const dermis_clip_layer* layers,
+                                  uint32_t layer_count, uint32_t node, float* weights,
+                                  uint32_t weight_count, dermis_error* error) {
+  return guarded(error, [&] {
+    std::vector<ClipLayer> all;
+    appendLayers(array(layers, layer_count, "layers"), all);
+    must(sampleWeights(required(bank, "bank").clips, all, node,
+                       array(weights, weight_count, "weights")));
   });
 }
 
