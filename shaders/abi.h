@@ -315,15 +315,30 @@ struct ActiveMorph {
 };
 DERMIS_CONSTANT ACTIVE_MORPH_WORDS = 2u;
 
-// An instance whose morph weights are written on the GPU, and the place where its active targets
-// are listed.
+// An instance whose morph weights are made on the GPU, and the place where its active targets are
+// listed. Layers are those of a FigureRecord.
 struct MorphListRecord {
   uint extension;    // word offset of its ExtensionRecord, whose `morphCount` is written
   uint list;         // word offset of the list, which has room for all targets
   uint weightCount;  // the number of targets
-  uint weights;      // word offset of the weights in their buffer, a float for each target
+  uint weights;  // word offset of the weights in their buffer, or of those at rest in the meshes
+  // The rest only if the weights are sampled. Words of the mesh buffer:
+  uint clips;  // the bank, or MORPH_LIST_NO_CLIPS
+  uint track;  // offset of the first track among those of a clip
+  uint masks;  // for each mask the factor
+  uint layerCount;
+  float time0;
+  uint layer0;
+  float time1;
+  uint layer1;
+  float time2;
+  uint layer2;
+  float time3;
+  uint layer3;
 };
-DERMIS_CONSTANT MORPH_LIST_WORDS = 4u;
+DERMIS_CONSTANT MORPH_LIST_WORDS = 16u;
+DERMIS_CONSTANT MORPH_LIST_LAYERS = 8u;  // the word of `time0`
+DERMIS_CONSTANT MORPH_LIST_NO_CLIPS = 0xffffffffu;
 
 // The result of an instance: the bounds of its skinned positions, and the number of clamped
 // vertices. The same as InstanceResult. Minimum and maximum are integers that compare like the

@@ -77,9 +77,11 @@ void storeInstance(uint word, InstanceRecord r) {
 void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(r.x, r.y, r.z, r.reserved); }
 #endif
 
+// Without the layers.
 MorphListRecord loadMorphList(uint word) {
   uvec4 a = tableUnit(word);
-  return MorphListRecord(a.x, a.y, a.z, a.w);
+  uvec4 b = tableUnit(word + 4u);
+  return MorphListRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, 0.0, 0u, 0.0, 0u, 0.0, 0u, 0.0, 0u);
 }
 
 ActiveMorph loadActiveMorph(uint word) { return ActiveMorph(tables[word], uintBitsToFloat(tables[word + 1u])); }

@@ -108,7 +108,7 @@ class GpuModelTest : public SystemTest,
     }
     for (const ModelInstance& its : model_->instances) {
       const InstanceHandle instance = its.handle;
-      if (its.description.morphWriter == MorphWriter::gpu) {
+      if (its.description.morphWriter != MorphWriter::cpu) {
         calls.push_back({[this, instance] {
           return system().change({.instance = instance, .morphs = morphSets[0]});
         }});

@@ -9,7 +9,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t chain = 20, beside = chain;  ///< nodes
+constexpr std::uint32_t chain = 20, beside = chain, faces = 21;  ///< nodes
 
 Skeleton skeletonOf(std::span<const std::uint32_t> bent, std::span<const std::uint32_t> turned,
                     std::span<const JointMatrix> inverseBind) {
@@ -19,6 +19,11 @@ Skeleton skeletonOf(std::span<const std::uint32_t> bent, std::span<const std::ui
     if (node > 0) skeleton.nodes.back().parent = node - 1;
   }
   skeleton.nodes.push_back({.parent = 0, .translation = {0.4, 0, 0}, .rotation = {0.6, 0, 0, 0.8}});
+  static constexpr std::array<float, 4> weights{0, 0.25f, 0, 0.5f};
+  for (const std::size_t count : {3u, 4u}) {
+    skeleton.nodes.push_back({.parent = 0});
+    skeleton.nodes.back().weights = std::span(weights).first(count);
+  }
   skeleton.skins = {{"bent", bent, inverseBind}, {"turned", turned, inverseBind}};
   return skeleton;
 }
@@ -49,11 +54,20 @@ Result<PackedClips> pack() {
                     .interpolation = Interpolation::step,
                     .times = times,
                     .values = turns}};
+  // Weights that are 0 at times.
+  static constexpr std::array<float, 12> threes{0, 1, 0, 0, 0.5f, 0, 0.75f, 0, 0, 0, 0, 0};
+  static constexpr std::array<float, 16> fours{0, 0, 0, 0, 1,     0, 0, -0.5f,
+                                               0, 0, 0, 0, 0.25f, 1, 1, 0.5f};
+  walk.channels.push_back({.node = faces, .path = weights, .times = times, .values = threes});
+  walk.channels.push_back({.node = faces + 1, .path = weights, .times = times, .values = fours});
+  jump.channels.push_back({faces, weights, Interpolation::step, times, threes});
+  jump.channels.push_back({faces + 1, weights, Interpolation::step, times, fours});
   ClipView swell{.name = "swell", .duration = 1, .additive = true};
   swell.channels = {{.node = 8, .path = scale, .times = times, .values = scales},
-                    {.node = 1, .path = rotation, .times = times, .values = others}};
+                    {.node = 1, .path = rotation, .times = times, .values = others},
+                    {.node = faces + 1, .path = weights, .times = times, .values = fours}};
   const std::array clips{std::move(walk), std::move(jump), std::move(swell)};
-  std::array<float, chain + 1> mask{};
+  std::array<float, faces + 2> mask{};
   std::fill(mask.begin() + 2, mask.end(), 0.5f);
   const std::array<std::span<const float>, 1> masks{mask};
   return packClips(skeletonOf(bent, turned, inverseBind), clips, {.masks = masks});
@@ -81,6 +95,20 @@ std::span<const ClipLayer> playedLayers(std::uint32_t play) {
       {{swell, 0.9}},
       {{walk, 1e6, 1, 0, true}, {walk, 0.55, 0.5f}}};
   return plays[play];
+}
+
+std::uint32_t weightedNode(std::uint32_t targets) {
+  return targets == 3 ? faces : faces + 1;
+}
+
+std::vector<MorphWeight> playedMorphs(std::uint32_t play, std::uint32_t targets) {
+  std::vector<float> weights(targets);
+  must(sampleWeights(playedClips(), playedLayers(play), weightedNode(targets), weights));
+  std::vector<MorphWeight> morphs;
+  for (std::uint32_t target = 0; target < targets; ++target) {
+    if (weights[target] != 0) morphs.push_back({target, weights[target]});
+  }
+  return morphs;
 }
 
 std::vector<JointMatrix> playedPose(std::uint32_t play, std::uint32_t skin) {

@@ -198,8 +198,9 @@ struct PipelineNeeds {
 
 /// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
 /// `culledOnGpu` also the visibility kernel, with `figures` the two that sample clips, and with
-/// `morphsOnGpu` the one that lists morph targets. Fails as `placeVertices` does, and with `invalidArgument` if the layout breaks a rule of
-/// `OutputAttribute`, or if the method, the limits or the tuning are not valid.
+/// `morphsOnGpu` the one that lists morph targets. Fails as `placeVertices` does, and with
+/// `invalidArgument` if the layout breaks a rule of `OutputAttribute`, or if the method, the limits
+/// or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs,
                                                           const DeviceLimits& limits,
                                                           const Tuning& tuning);

@@ -104,6 +104,9 @@ enum class MorphWriter : std::uint8_t {
   /// A GPU pass of the engine: a float for each morph target, always to the same memory. The engine
   /// then calls `markMorphsWritten`. The GPU lists the targets whose weight is not 0.
   gpu = 1,
+  /// The clips that the figure of its pose plays (`InstanceDescription::weightsOf`). While its pose
+  /// belongs to no figure, no target is active.
+  clips = 2,
 };
 
 /// One instance of a scene.
@@ -135,6 +138,9 @@ struct InstanceDescription {
   bool culledOnGpu = false;
   /// Other than the CPU needs a mesh with morph targets.
   MorphWriter morphWriter = MorphWriter::cpu;
+  /// With `MorphWriter::clips`: the node of the skeleton whose weights drive the instance. The bank
+  /// must have as many for it as the mesh has targets (`PackedClips::weightCount`).
+  std::uint32_t weightsOf = 0xffffffffu;
 };
 
 /// What changes about an instance: every member that has a value. If the mesh, pose, method or box
@@ -151,13 +157,14 @@ struct InstanceChange {
   std::optional<std::uint32_t> updateInterval = {};  ///< as `InstanceDescription::updateInterval`
   /// Another mesh, for example a level of detail. The output moves, and previous positions are set
   /// to the current ones. Morph weights are kept if both meshes have the same number of targets;
-  /// otherwise they are removed, or the change fails if the GPU writes them.
+  /// otherwise they are removed, or the change fails if not the CPU writes them.
   std::optional<MeshHandle> mesh = {};
   std::optional<PoseHandle> pose = {};  ///< previous positions are kept
   /// For positions in snorm16. Previous positions are set to the current ones, since the old ones
   /// are relative to the old box.
   std::optional<Box> box = {};
-  /// The active targets, as `Job::morphs`. The weights are copied. Fails if the GPU writes them.
+  /// The active targets, as `Job::morphs`. The weights are copied. Fails if not the CPU writes
+  /// them.
   std::optional<std::span<const MorphWeight>> morphs = {};
 };
 

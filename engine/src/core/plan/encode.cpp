@@ -360,21 +360,28 @@ void Encoder::writeInstances() {
     store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
     if (candidate != work_->culled.end() && candidate->instance == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - work_->culled.begin())] = place;
-    if (list != work_->morphLists.end() && list->instance == number)
-      listRecords_.push_back({extension, extension + abi::EXTENSION_WORDS,
-                              instance.extras->writtenMorphs, (list++)->weights});
+    if (list != work_->morphLists.end() && list->instance == number) {
+      abi::MorphListRecord& made = listRecords_.emplace_back((list++)->record);
+      made.extension = extension;
+      made.list = extension + abi::EXTENSION_WORDS;
+      made.weightCount = instance.extras->writtenMorphs;
+    }
   }
   culled_.instances = firstRecord;
   markEvenlySpaced(firstRecord);
 }
 
-/// One invocation for each list; a dispatch for each buffer that has weights.
+/// One invocation for each list; a dispatch for each buffer that has weights, and one for those
+/// that are sampled.
 Result<void> Encoder::addMorphLists() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::span<const Work::MorphList> lists = work_->morphLists;
-  std::uint32_t buffers = 0;
-  for (const Work::MorphList& list : lists) buffers = std::max(buffers, list.buffer + 1);
-  for (std::uint32_t buffer = 0; buffer < buffers; ++buffer) {
+  std::vector<std::uint32_t>& buffers = listBuffers_;
+  buffers.clear();
+  for (const Work::MorphList& list : lists) {
+    if (std::ranges::find(buffers, list.buffer) == buffers.end()) buffers.push_back(list.buffer);
+  }
+  for (const std::uint32_t buffer : buffers) {
     alignToUnit(tables);
     const std::uint32_t first = wordsOf(tables);
     for (std::size_t i = 0; i < lists.size(); ++i) {
@@ -383,7 +390,6 @@ Result<void> Encoder::addMorphLists() {
       store(tables, tables.size() - abi::MORPH_LIST_WORDS, listRecords_[i]);
     }
     const std::uint32_t count = (wordsOf(tables) - first) / abi::MORPH_LIST_WORDS;
-    if (count == 0) continue;
     if (Result<void> good = addDispatch(variantOf(Kernel::morphLists, limits_, tuning_),
                                         divideUp(count, tuning_.workgroupSize),
                                         abi::MorphListPush{first, count, 0});
@@ -391,6 +397,7 @@ Result<void> Encoder::addMorphLists() {
       return good;
     lists_.push_back(dispatches_.back());
     dispatches_.pop_back();
+    if (buffer == notUsed) continue;
     lists_.back().joints = BufferRole::gpuPoses;
     lists_.back().poseBuffer = buffer;
   }
@@ -576,7 +583,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     // dispatch wrote.
     parts[abi::BINDING_RESULTS] = orElse(results, tables);
   } else if (variant.kernel == Kernel::morphLists) {
-    parts[abi::BINDING_WEIGHTS] = joints;
+    parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
+    parts[abi::BINDING_WEIGHTS] = readsPoses ? joints : buffers[BufferRole::meshes];
   } else if (variant.kernel == Kernel::sample || variant.kernel == Kernel::compose) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = buffers[BufferRole::palettes];

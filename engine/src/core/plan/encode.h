@@ -80,6 +80,7 @@ class Encoder {
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
   /// Of each of `Work::morphLists`.
   std::vector<abi::MorphListRecord> listRecords_;
+  std::vector<std::uint32_t> listBuffers_;
   std::vector<Dispatch> lists_;  ///< they write tables, before all others
   std::vector<Dispatch> dispatches_;
   std::array<Dispatch, 2> visibility_;  ///< the passes of the visibility kernel

@@ -33,7 +33,7 @@ struct InstanceExtras {
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
-  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are written on the GPU
+  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are made on the GPU
 
   bool isNeeded() const {
     return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0;
@@ -80,9 +80,9 @@ struct Work {
   };
   /// Active morph targets that the GPU lists: of an instance with `InstanceExtras::writtenMorphs`.
   struct MorphList {
-    std::uint32_t instance;  ///< index into `instances`
-    std::uint32_t buffer;    ///< of poses, that has the weights
-    std::uint32_t weights;   ///< word offset there
+    std::uint32_t instance;       ///< index into `instances`
+    std::uint32_t buffer;         ///< of poses, that has the weights; `notUsed`: they are sampled
+    abi::MorphListRecord record;  ///< but for `extension`, `list` and `weightCount`
   };
   struct Culled {
     std::uint32_t instance;  ///< index into `instances`

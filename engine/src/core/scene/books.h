@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "clips/bank.h"
 #include "clips/device_clips.h"
 #include "clips/sample.h"
 #include "dermis/clips.h"
@@ -198,10 +199,11 @@ struct SceneInstance {
   PoseHandle poseHandle;
   bool bounds = false;
   MorphWriter morphWriter = MorphWriter::cpu;
-  std::uint32_t weightsBuffer = 0;  ///< of poses, that has the weights which the GPU writes …
-  Range weights;                    ///< … and where they are there, in joints
-  bool isWritten = false;           ///< `InstanceOutput::isWritten`
-  std::optional<Place> shown;       ///< where it was last recorded
+  std::uint32_t weightsOf = notUsed;  ///< node of a skeleton
+  std::uint32_t weightsBuffer = 0;    ///< of poses, that has the weights which the GPU writes …
+  Range weights;                      ///< … and where they are there, in joints
+  bool isWritten = false;             ///< `InstanceOutput::isWritten`
+  std::optional<Place> shown;         ///< where it was last recorded
 
   const Place& place() const { return shown ? *shown : target; }
 };
@@ -226,6 +228,8 @@ struct SceneBooks {
     std::vector<JointMatrix> staged;  ///< what the CPU writes where the buffer is not mapped
   };
 
+  Result<void> checkMorphWriter(const SceneInstance& instance, const ScenePose& pose,
+                                std::uint32_t targets) const;
   Result<void> check(const SceneInstance& instance, std::uint32_t updateInterval) const;
   Result<void> takeResult(SceneInstance& instance);
   void freeResult(const SceneInstance& instance);
@@ -297,6 +301,9 @@ struct SceneBooks {
   // figures.cpp
   void sampleFigure(std::uint32_t index);
   void gatherFigures();
+  std::optional<BankMorphed> findMorphed(const SceneInstance& instance) const;
+  void sampleMorphs(SceneInstance& instance);
+  void listMorphs(const SceneInstance& instance);
 
   // stores.cpp
   Result<void> createFirstBuffers();
@@ -417,6 +424,7 @@ struct SceneBooks {
   std::uint32_t nextVersion_ = 0;
   std::vector<PlacedRun> runsScratch_;
   std::vector<MorphWeight> morphsScratch_;
+  std::vector<float> weightsScratch_;
   std::vector<PackedLayers> layersScratch_;
 
   std::vector<PoseHandle> posed_;         ///< written since the last plan

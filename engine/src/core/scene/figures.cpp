@@ -146,6 +146,67 @@ Result<void> Scene::play(std::span<const FigurePlay> plays) {
   return {};
 }
 
+/// The node whose weights drive an instance; none while its pose belongs to no figure.
+std::optional<BankMorphed> SceneBooks::findMorphed(const SceneInstance& instance) const {
+  const std::uint32_t figure = poses_.at(instance.pose).figure;
+  if (instance.morphWriter != MorphWriter::clips || figure == notUsed) return {};
+  const SceneClips& clips = clips_.at(figures_.at(figure).clips.index);
+  return ClipBank(clips.content->bank).morphedNode(instance.weightsOf);
+}
+
+/// On the CPU: the active targets as of now.
+void SceneBooks::sampleMorphs(SceneInstance& instance) {
+  std::vector<MorphWeight>& active = instance.extras.morphs;
+  active.clear();
+  if (const std::optional<BankMorphed> node = findMorphed(instance)) {
+    const SceneFigure& figure = figures_.at(poses_.at(instance.pose).figure);
+    weightsScratch_.resize(node->count);
+    sampleWeights(clips_.at(figure.clips.index).content->bank, figure.layers, *node,
+                  weightsScratch_);
+    for (std::uint32_t target = 0; target < node->count; ++target) {
+      const float weight = weightsScratch_[target];
+      if (weight != 0) active.push_back({target, weight});
+    }
+  }
+  // The instances of a group have active targets, or none has any.
+  if (active.empty()) active.push_back({0, 0});
+}
+
+/// For the GPU: what lists the active targets of the last of the work's instances.
+void SceneBooks::listMorphs(const SceneInstance& instance) {
+  Work::MorphList list{static_cast<std::uint32_t>(work_.instances.size() - 1), notUsed, {}};
+  if (instance.morphWriter == MorphWriter::gpu) {
+    list.buffer = instance.weightsBuffer;
+    list.record.clips = abi::MORPH_LIST_NO_CLIPS;
+    list.record.weights =
+        static_cast<std::uint32_t>(instance.weights.offset * sizeof(JointMatrix) / sizeof(float));
+  } else {
+    const std::optional<BankMorphed> node = findMorphed(instance);
+    if (!node) return;
+    const SceneFigure& figure = figures_.at(poses_.at(instance.pose).figure);
+    const SceneClips& clips = clips_.at(figure.clips.index);
+    const auto& layers = figure.layers.layers;
+    const auto bank = static_cast<std::uint32_t>(clips.bytes.offset / 4);
+    list.record = {.extension = 0,
+                   .list = 0,
+                   .weightCount = 0,
+                   .weights = bank + node->rest,
+                   .clips = bank,
+                   .track = 3 * ClipBank(clips.content->bank).header.nodeCount + node->firstGroup,
+                   .masks = bank + node->masks,
+                   .layerCount = figure.layers.count,
+                   .time0 = layers[0].time,
+                   .layer0 = layers[0].bits,
+                   .time1 = layers[1].time,
+                   .layer1 = layers[1].bits,
+                   .time2 = layers[2].time,
+                   .layer2 = layers[2].bits,
+                   .time3 = layers[3].time,
+                   .layer3 = layers[3].bits};
+  }
+  work_.morphLists.push_back(list);
+}
+
 std::span<JointMatrix> SceneBooks::matricesOf(const SceneFigure& figure) {
   const std::span<JointMatrix> first = matricesOf(poses_.at(figure.poses[0].index));
   return {first.data(), static_cast<std::size_t>(figure.joints.size)};

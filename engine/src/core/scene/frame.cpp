@@ -62,10 +62,8 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
     } else {
       work_.add(skinned);
     }
-    if (instance.extras.writtenMorphs == 0) return;
-    work_.morphLists.push_back(
-        {static_cast<std::uint32_t>(work_.instances.size() - 1), instance.weightsBuffer,
-         static_cast<std::uint32_t>(instance.weights.offset * sizeof(JointMatrix) / 4)});
+    const bool isSkinned = (flags & abi::INSTANCE_SETTLES) == 0;
+    if (isSkinned && instance.extras.writtenMorphs != 0) listMorphs(instance);
   };
   add(instance.run);
   for (const PlacedRun& run : instance.furtherRuns) add(run);
@@ -87,6 +85,7 @@ void SceneBooks::addDue(std::uint32_t index, bool restarts) {
   instance.plannedIn = planNumber_;
   due_.push_back({index, restarts});
   convertPalette(instance);
+  if (owner_.isCpu && instance.morphWriter == MorphWriter::clips) sampleMorphs(instance);
   addRuns(instance, states_[index].hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
   if (instance.extras.result != notUsed) {
     work_.clearedResults.push_back(instance.extras.result);

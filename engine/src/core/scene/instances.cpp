@@ -43,6 +43,30 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
 
 }  // namespace
 
+Result<void> SceneBooks::checkMorphWriter(const SceneInstance& instance, const ScenePose& pose,
+                                          std::uint32_t targets) const {
+  const MorphWriter writer = instance.morphWriter;
+  if (writer > MorphWriter::clips)
+    return notAValue("the instance: its morphWriter", writer, "MorphWriter");
+  if (writer == MorphWriter::cpu) return {};
+  if (writer == MorphWriter::gpu && owner_.isCpu)
+    return invalid("the GPU cannot write the instance's morph weights: the CPU skins it");
+  if (targets == 0)
+    return invalid("only the CPU can write the instance's morph weights: its mesh has no targets");
+  std::uint32_t weights = instance.extras.writtenMorphs;
+  if (writer == MorphWriter::clips) {
+    if (pose.figure == notUsed) return {};
+    const SceneClips& clips = clips_.at(figures_.at(pose.figure).clips.index);
+    weights = clips.content->bank.weightCount(instance.weightsOf);
+  } else if (weights == 0) {
+    return {};  // it is new
+  }
+  if (weights == targets) return {};
+  return invalid("the instance has " + std::to_string(weights) +
+                 " morph weights, which the CPU does not write, but its mesh has " +
+                 std::to_string(targets) + " targets");
+}
+
 /// Checks everything except room in the buffers.
 Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t updateInterval) const {
   const SceneMesh* mesh = meshes_.find(instance.mesh);
@@ -69,20 +93,8 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
                    std::to_string(instance.poseHandle.index) + " has " +
                    std::to_string(pose->jointCount));
   }
-  if (instance.morphWriter != MorphWriter::cpu) {
-    if (instance.morphWriter > MorphWriter::gpu)
-      return notAValue("the instance: its morphWriter", instance.morphWriter, "MorphWriter");
-    if (owner_.isCpu)
-      return invalid("the GPU cannot write the instance's morph weights: the CPU skins it");
-    if (mesh->info.morphTargetCount == 0)
-      return invalid("the GPU cannot write the instance's morph weights: its mesh has no targets");
-    const std::uint32_t targets = instance.extras.writtenMorphs;
-    if (targets != 0 && mesh->info.morphTargetCount != targets) {
-      return invalid("the GPU writes the instance's " + std::to_string(targets) +
-                     " morph weights, but its mesh has " +
-                     std::to_string(mesh->info.morphTargetCount) + " targets");
-    }
-  }
+  if (Result<void> good = checkMorphWriter(instance, *pose, mesh->info.morphTargetCount); !good)
+    return good;
   const PoseDescription own{pose->jointCount, 0, pose->promise};
   Batch batch;
   batch.poses = {&own, 1};
@@ -97,8 +109,9 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
 /// Where the GPU writes morph weights: in a buffer of poses that it writes, which stays where it
 /// is.
 Result<void> SceneBooks::takeWeights(SceneInstance& instance) {
-  if (instance.morphWriter == MorphWriter::cpu) return {};
+  if (instance.morphWriter == MorphWriter::cpu || owner_.isCpu) return {};
   instance.extras.writtenMorphs = meshes_.at(instance.mesh.index).info.morphTargetCount;
+  if (instance.morphWriter == MorphWriter::clips) return {};
   const std::uint64_t joints =
       (instance.extras.writtenMorphs * sizeof(float) + sizeof(JointMatrix) - 1) /
       sizeof(JointMatrix);
@@ -113,7 +126,8 @@ Result<BufferPart> SceneBooks::weightsPart(InstanceHandle handle) const {
   const SceneInstance* instance = instances_.find(handle);
   if (instance == nullptr) return unknownHandle("instance", handle);
   if (instance->morphWriter != MorphWriter::gpu)
-    return invalid("the CPU writes the morph weights of instance " + std::to_string(handle.index));
+    return invalid("no GPU pass writes the morph weights of instance " +
+                   std::to_string(handle.index));
   return BufferPart{poseBuffers_[instance->weightsBuffer].buffer.number,
                     instance->weights.offset * sizeof(JointMatrix),
                     instance->extras.writtenMorphs * sizeof(float)};
@@ -274,6 +288,7 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   instance.extras.box = description.box;
   instance.bounds = description.bounds;
   instance.morphWriter = description.morphWriter;
+  instance.weightsOf = description.weightsOf;
   if (Result<void> good = books.check(instance, description.updateInterval); !good)
     return good.error();
   if (!books.hasSlot()) {
@@ -377,6 +392,9 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
   if (mesh != nullptr &&
       mesh->info.morphTargetCount != meshes_.at(instance.mesh.index).info.morphTargetCount)
     changed.extras.morphs.clear();
+  if (mesh != nullptr && changed.morphWriter == MorphWriter::clips &&
+      changed.extras.writtenMorphs != 0)
+    changed.extras.writtenMorphs = mesh->info.morphTargetCount;
   if (mesh != nullptr && change.morphs) {
     if (Result<void> good =
             checkMorphs(*change.morphs, mesh->info.morphTargetCount, {"instance", handle.index});
@@ -453,7 +471,7 @@ Result<void> SceneBooks::changeSkinning(const InstanceChange& change) {
   const bool hasNewBox = change.box && isSnormPosition(instance.layout.positions);
   if (change.morphs && instance.morphWriter != MorphWriter::cpu) {
     return invalid("instance " + std::to_string(change.instance.index) +
-                   ": the GPU writes its morph weights; use markMorphsWritten");
+                   ": not the CPU writes its morph weights");
   }
   // A box and morph weights alone need neither other kernels nor room.
   if (hasNewMesh || change.pose || change.method || (hasNewBox && change.morphs))
