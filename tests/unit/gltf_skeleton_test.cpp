@@ -59,7 +59,7 @@ TEST(GltfSkeleton, HasAllSkins) {
   EXPECT_EQ(skeleton.skins[0].inverseBind.size(), 2u);
 }
 
-TEST(GltfSkeleton, ClipsHaveAllChannelsButWeights) {
+TEST(GltfSkeleton, ClipsHaveAllChannels) {
   const gltf::Model from = model();
   const std::vector<ClipView> clips = gltf::clips(from);
   ASSERT_EQ(clips.size(), 1u);
@@ -69,14 +69,15 @@ TEST(GltfSkeleton, ClipsHaveAllChannelsButWeights) {
   EXPECT_TRUE(clip.wraps);
   EXPECT_FALSE(clip.additive);
   ASSERT_EQ(from.clips.at(0).channels.size(), 3u);
-  ASSERT_EQ(clip.channels.size(), 2u);
-  EXPECT_EQ(clip.channels[0].path, ChannelPath::translation);
-  EXPECT_EQ(clip.channels[0].interpolation, Interpolation::linear);
-  EXPECT_EQ(clip.channels[1].path, ChannelPath::rotation);
-  EXPECT_EQ(clip.channels[1].interpolation, Interpolation::step);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const gltf::Channel& channel = from.clips[0].channels[i + 1];
-    EXPECT_EQ(clip.channels[i].node, 1u);
+  ASSERT_EQ(clip.channels.size(), 3u);
+  EXPECT_EQ(clip.channels[0].path, ChannelPath::weights);
+  EXPECT_EQ(clip.channels[1].path, ChannelPath::translation);
+  EXPECT_EQ(clip.channels[1].interpolation, Interpolation::linear);
+  EXPECT_EQ(clip.channels[2].path, ChannelPath::rotation);
+  EXPECT_EQ(clip.channels[2].interpolation, Interpolation::step);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const gltf::Channel& channel = from.clips[0].channels[i];
+    EXPECT_EQ(clip.channels[i].node, i == 0 ? 0u : 1u);
     EXPECT_EQ(clip.channels[i].times.data(), channel.times.data());
     EXPECT_EQ(clip.channels[i].times.size(), 2u);
     EXPECT_EQ(clip.channels[i].values.data(), channel.values.data());
