@@ -289,6 +289,8 @@ DERMIS_CONSTANT INSTANCE_SETTLES = 0x200000u;
 DERMIS_CONSTANT INSTANCE_HAS_MOTION = 0x400000u;  // it has previous positions
 // It has a result (ExtensionRecord::result), which is cleared when it is skinned.
 DERMIS_CONSTANT INSTANCE_HAS_RESULT = 0x800000u;
+// In this frame its previous positions are drawn: they are only settled if it becomes visible.
+DERMIS_CONSTANT INSTANCE_HOLDS = 0x1000000u;
 
 // Data that only some instances have.
 struct ExtensionRecord {

@@ -55,8 +55,10 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
     history[slot].moves = (instance.joints & (INSTANCE_HAS_MOTION | INSTANCE_RESTARTS)) == INSTANCE_HAS_MOTION ? 1u : 0u;
     return true;
   }
-  // The instance has not changed: its previous positions are set to the current ones, once.
+  // The instance has not changed: its previous positions are set to the current ones, once. An instance that is held was skinned, if
+  // not by a restart, when its version was new.
   if (history[slot].moves == 0u) return false;
+  if (wasVisible && (instance.joints & INSTANCE_HOLDS) != 0u) return false;
   history[slot].moves = 0u;
   atomicAdd(counters.settled, 1u);
   instance.joints |= INSTANCE_SETTLES;

@@ -57,6 +57,7 @@ struct Twins {
     std::copy_n(like.box.max, 3, desc.box.max);
     desc.wants_bounds = like.bounds ? 1 : 0;
     desc.update_interval = like.updateInterval;
+    desc.interpolates = like.interpolates ? 1 : 0;
     return desc;
   }
   std::size_t add(std::size_t pose, InstanceDescription description = {}) {
@@ -101,6 +102,9 @@ struct Twins {
       expectOk(dermis_instance_contents(scene, cInstances[i], &info, &error));
       EXPECT_EQ(info.is_written, expected.isWritten ? 1u : 0u);
       EXPECT_EQ(info.offset, expected.offset);
+      EXPECT_EQ(info.interpolation, expected.interpolation);
+      EXPECT_EQ(info.motion_scale, expected.motionScale);
+      interpolations += info.interpolation < 1;
       EXPECT_EQ(info.mesh.index, expected.mesh.index);
       EXPECT_EQ(info.mesh.generation, expected.mesh.generation);
       EXPECT_EQ(info.is_due, must(same.scene().isDue(instances[i])) ? 1u : 0u);
@@ -146,6 +150,7 @@ struct Twins {
   std::vector<MeshHandle> meshes;
   std::vector<PoseHandle> poses;
   std::vector<InstanceHandle> instances;
+  std::size_t interpolations = 0;  ///< instances that were to be drawn between two updates
   std::vector<dermis_mesh> cMeshes;
   std::vector<dermis_pose> cPoses;
   std::vector<dermis_instance> cInstances;
@@ -171,6 +176,9 @@ TEST(CSceneTest, InstancesOfEveryMethodAndLayout) {
         VertexFormat::float32x3, VertexFormat::float32x3, VertexFormat::none, false, false, 32};
     description.updateInterval = 2;
     twins.add(pose, description);
+    description.layout.stride = 0;
+    description.layout.motion = description.interpolates = true;
+    twins.add(pose, description);
   }
   for (std::uint32_t frame = 0; frame < 4; ++frame) {
     twins.begin();
@@ -178,6 +186,7 @@ TEST(CSceneTest, InstancesOfEveryMethodAndLayout) {
       twins.write(pose, 5 * frame + static_cast<std::uint32_t>(pose));
     twins.run();
   }
+  EXPECT_GT(twins.interpolations, 0u);
 }
 
 TEST(CSceneTest, EveryChange) {

@@ -252,6 +252,7 @@ class Caller : Imports {
     desc.wants_bounds = oneOf(4);
     desc.update_interval = number(0, 3);
     desc.culled_on_gpu = engine.commands != nullptr && oneOf(4);
+    desc.interpolates = desc.layout.motion != 0 && oneOf(2);
     return desc;
   }
   void addInstance() {
@@ -511,6 +512,7 @@ class Caller : Imports {
     const auto info = filled<dermis_instance_info>();
     const auto known = call({&info}, dermis_instance_contents, engine.scene, instance, info.get());
     expect((known == DERMIS_OK) == (info.isValid && find(engine.instances, instance)));
+    if (known == DERMIS_OK) expect(info->interpolation > 0 && info->interpolation <= 1);
     const auto scene = filled<dermis_scene_info>();
     const auto told = call({&scene}, dermis_scene_contents, engine.scene, scene.get());
     expect((told == DERMIS_OK) == scene.isValid);

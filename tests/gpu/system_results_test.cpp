@@ -55,6 +55,38 @@ class SystemResultsTest : public SystemVisibilityTest {
   }
 };
 
+// As the GPU has both, in each frame.
+TEST_F(SystemResultsTest, WhatIsDrawnBetweenUpdatesHasTheBoxOfBothPositions) {
+  for (const bool culledOnGpu : {false, true}) {
+    instances_.clear();
+    palettes_.clear();
+    instance_.bounds = instance_.interpolates = true;
+    instance_.updateInterval = 3;
+    open(culledOnGpu, motionLayout());
+    std::uint32_t moving = 0;
+    for (std::uint32_t frame = 1; frame <= 12; ++frame) {
+      if (frame > 1 && frame < 8) moveAll(100 * frame);
+      submit();
+      const std::vector<std::byte> bytes = engine_->readOutput();
+      completed();
+      for (std::uint32_t i = 0; i < instanceCount; ++i) {
+        SCOPED_TRACE("frame " + std::to_string(frame) + ", instance " + std::to_string(i));
+        const Streams streams = engine_->read(bytes, instances_[i]);
+        Box both = boxOf(streams[positionStream]);
+        const Box earlier = boxOf(streams[previousStream]);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          both.min[axis] = std::min(both.min[axis], earlier.min[axis]);
+          both.max[axis] = std::max(both.max[axis], earlier.max[axis]);
+        }
+        expectBox(boundsOf(i), both);
+        moving += streams[positionStream] != streams[previousStream];
+      }
+    }
+    EXPECT_GT(moving, 4 * instanceCount);
+    submit();
+  }
+}
+
 // The box of each pose, not of all poses so far.
 TEST_F(SystemResultsTest, WhatTheGpuChoosesHasTheBoxOfItsNewestPose) {
   openWithBounds(true);

@@ -247,6 +247,44 @@ TEST_F(SystemVisibilityTest, WhatAppearsBetweenItsTurnsShowsThePoseOfTheLastOrOf
   }
 }
 
+// Each instance goes to its new pose on its beat, and settles an interval later. Those that leave
+// and return meanwhile settle when they return.
+TEST_F(SystemVisibilityTest, WhatIsDrawnBetweenUpdatesIsHeldUntilItHasReachedItsPose) {
+  constexpr std::uint32_t interval = 4, away = 10;
+  instance_.updateInterval = interval;
+  instance_.interpolates = true;
+  open(true, motionLayout());
+  submit();
+  engine_->begin();
+  moveAll(100);
+  std::vector<std::uint32_t> updatedIn(instanceCount, 0), settled(instanceCount, 0);
+  for (std::uint32_t frame = 2; frame <= 2 * interval + 2; ++frame) {
+    SCOPED_TRACE(frame);
+    const bool isLeaving = frame == interval + 2, isReturning = frame == interval + 3;
+    show(isLeaving ? away : 0, instanceCount - (isLeaving ? away : 0));
+    submit();
+    const std::vector<std::byte> bytes = engine_->readOutput();
+    std::uint32_t settling = 0;
+    for (std::uint32_t i = 0; i < instanceCount; ++i) {
+      const bool hasMoved =
+          engine_->read(bytes, instances_[i])[positionStream] == positionsIn(i + 100);
+      if (hasMoved && updatedIn[i] == 0) updatedIn[i] = frame;
+      const bool isSeen = !isLeaving || i >= away;
+      const bool isDone = updatedIn[i] != 0 && frame >= updatedIn[i] + interval;
+      if (hasMoved && isSeen && settled[i] == 0 && (isDone || (isReturning && i < away))) {
+        settled[i] = frame;
+        ++settling;
+      }
+      expectMotion(bytes, i, hasMoved ? 100 : 0, settled[i] != 0 ? 100 : 0);
+    }
+    EXPECT_EQ(completed().settledInstances, settling);
+  }
+  EXPECT_EQ(std::ranges::count(settled, 0u), 0);
+  for (std::uint32_t turn = 2; turn < 2 + interval; ++turn)
+    EXPECT_NE(std::ranges::count(updatedIn, turn), 0) << "they take turns";
+  submit();
+}
+
 TEST_F(SystemVisibilityTest, SomeAreCulledOnTheGpuAndSomeAreNot) {
   open(true, motionLayout());
   InstanceDescription other = instance_;

@@ -104,6 +104,7 @@ class ModelSteps {
     // Or else nothing was tested.
     EXPECT_GT(checkedInstances_, 1000u);
     EXPECT_GT(movedInstances_, 20u);
+    EXPECT_GT(interpolations_, 1000u);
     EXPECT_GT(refusals_, 20u);
     EXPECT_GT(abandonedFrames_, 50u);
     EXPECT_GT(growths_, 80u);
@@ -253,6 +254,7 @@ class ModelSteps {
       description.weightsOf = weightedNode(targetsOf(mesh->first));
       if (hasGpu) description.layout = someLayouts()[below(2)];  // in float32
     }
+    description.interpolates = description.layout.motion && chance(50);
     prepare(description);
     if (chance(30))
       tryToAdd([&] { return system().addInstance(description); },
@@ -436,6 +438,7 @@ class ModelSteps {
     ++submittedFrames_;
     model_->afterRecord();
     movedInstances_ += std::exchange(model_->movedInstances, 0);
+    interpolations_ += std::exchange(model_->interpolations, 0);
     const std::uint64_t output = outputNow();
     growths_ += std::exchange(output_, output) != output;
     if (submittedFrames_ % 8 == 0) expectOutputs();
@@ -515,6 +518,7 @@ class ModelSteps {
     const ModelInstance& instance = anyInstance();
     InstanceDescription description = instance.description;
     description.updateInterval = 1;
+    description.interpolates = false;  // some layouts of the calls have no motion
     std::vector<RefusedCall> calls = refusedCalls(
         system(), {description, instance.handle,
                    gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())], narrow_});
@@ -658,13 +662,16 @@ class ModelSteps {
     const std::optional<Box> box = must(system().bounds(instance.handle));
     ASSERT_EQ(box.has_value(), instance.bounded.has_value()) << instance.handle.index;
     if (!box) return;
-    const std::vector<std::byte>& positions = expected(instance, *instance.bounded)[positionStream];
-    Box wanted;
-    for (std::size_t i = 0; i < positions.size() / sizeof(float); ++i) {
-      float value;
-      std::memcpy(&value, positions.data() + i * sizeof(float), sizeof(value));
-      wanted.min[i % 3] = i < 3 ? value : std::min(wanted.min[i % 3], value);
-      wanted.max[i % 3] = i < 3 ? value : std::max(wanted.max[i % 3], value);
+    Box wanted{{HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
+    for (const std::optional<ShownPose>& shown : {instance.bounded, instance.earlierBounded}) {
+      if (!shown) continue;
+      const std::vector<std::byte>& positions = expected(instance, *shown)[positionStream];
+      for (std::size_t i = 0; i < positions.size() / sizeof(float); ++i) {
+        float value;
+        std::memcpy(&value, positions.data() + i * sizeof(float), sizeof(value));
+        wanted.min[i % 3] = std::min(wanted.min[i % 3], value);
+        wanted.max[i % 3] = std::max(wanted.max[i % 3], value);
+      }
     }
     EXPECT_EQ(std::memcmp(&*box, &wanted, sizeof(wanted)), 0) << instance.handle.index;
   }
@@ -703,7 +710,7 @@ class ModelSteps {
   std::set<std::string> messages_;  ///< of all errors
   std::uint32_t submittedFrames_ = 0, abandonedFrames_ = 0, failedFrames_ = 0, failedCalls_ = 0;
   std::uint64_t growths_ = 0, output_ = 0;
-  std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0;
+  std::uint64_t refusals_ = 0, movedInstances_ = 0, checkedInstances_ = 0, interpolations_ = 0;
 };
 
 }  // namespace dermis::test

@@ -53,6 +53,10 @@ std::vector<RefusedCall> refusedCalls(System& system, const SceneObjects& object
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 26}; });
   add([](InstanceDescription& wrong) { wrong.layout = {.stride = 1 << 20}; });
   add([](InstanceDescription& wrong) {
+    wrong.layout.motion = false;
+    wrong.interpolates = true;
+  });
+  add([](InstanceDescription& wrong) {
     wrong.layout.positions = VertexFormat::snorm16x4;
     wrong.box = {{0, 0, 0}, {0, 1, 1}};
   });

@@ -59,9 +59,16 @@ struct ModelInstance {
   bool wasDisplayed = false;
   bool isMoving = false;  ///< its previous positions are not its positions
   std::optional<ShownPose> shown, before;
-  std::optional<ShownPose> bounded;  ///< as it was last skinned
+  /// Of those that interpolate: when it was last skinned, or for the GPU was to be skinned.
+  std::uint64_t updatedIn = 0;
+  std::uint32_t updatedInterval = 1;                 ///< its update interval then
+  std::optional<ShownPose> bounded, earlierBounded;  ///< as it was last skinned, and before that
 
   void change() { isChanged = isNew = true; }
+  void updateIn(std::uint64_t frame) {
+    updatedIn = frame;
+    updatedInterval = description.updateInterval;
+  }
   bool isDisplayed() const { return isVisible && (!description.culledOnGpu || isShownByGpu); }
 };
 
@@ -74,6 +81,7 @@ class SystemModel {
   std::vector<ModelInstance> instances;
   bool mayMove = false;  ///< `compact` was called since the last `record`
   std::uint64_t movedInstances = 0;
+  std::uint64_t interpolations = 0;  ///< instances that were drawn between two updates
 
   bool isPoseUsed(std::uint32_t palette) const {
     return std::ranges::any_of(
@@ -123,7 +131,8 @@ class SystemModel {
       instance.isUrgent = instance.teleports = true;
       instance.isMoving = instance.isOwed = false;
       instance.waitedFrames = 0;
-      instance.shown = instance.before = instance.bounded = std::nullopt;
+      instance.shown = instance.before = std::nullopt;
+      instance.bounded = instance.earlierBounded = std::nullopt;
     }
   }
   /// After `record`: checks what was skinned, settled and moved, and where everything stands.
@@ -215,6 +224,7 @@ class SystemModel {
     if (instance.description.culledOnGpu && instance.isVisible && instance.isNew &&
         (instance.isDue || instance.teleports || instance.isUrgent)) {
       instance.isOwed = true;
+      instance.updateIn(engine_.frame());
       instance.isNew = instance.isUrgent = false;
     }
     if (instance.isDisplayed()) {
@@ -223,6 +233,25 @@ class SystemModel {
       updateHidden(instance, isPlaced, lists);
     }
     instance.teleports = false;
+    checkInterpolation(instance);
+  }
+  /// What the vertex shader does with it: from the positions before to those of the last update in
+  /// so many frames as its interval was.
+  void checkInterpolation(const ModelInstance& instance) {
+    const InstanceOutput& output = instance.output;
+    const bool mayRest = instance.description.culledOnGpu && instance.description.interpolates;
+    if (instance.isDisplayed() && instance.isMoving && instance.description.interpolates) {
+      const auto interval = static_cast<float>(instance.updatedInterval);
+      const auto frames = static_cast<float>(engine_.frame() - instance.updatedIn + 1);
+      EXPECT_EQ(output.interpolation, frames / interval);
+      EXPECT_EQ(output.motionScale, 1 / interval);
+      ++interpolations;
+    } else if (instance.isDisplayed() && !mayRest) {
+      EXPECT_EQ(output.interpolation, 1.0f);
+      EXPECT_EQ(output.motionScale, 1.0f);
+    }
+    EXPECT_GT(output.interpolation, 0.0f);
+    EXPECT_LE(output.interpolation, 1.0f);
   }
   void updateHidden(ModelInstance& instance, bool isPlaced, const Lists& lists) {
     EXPECT_FALSE(lists.skinned.contains(instance.handle.index)) << "nobody sees it";
@@ -244,18 +273,27 @@ class SystemModel {
       const ShownPose now = wantedPose(instance);
       instance.before = restarts ? now : instance.shown;
       instance.shown = instance.bounded = now;
+      if (!isCulled) instance.updateIn(engine_.frame());
       instance.isMoving = hasPrevious && !restarts;
       instance.isChanged = instance.isUrgent = instance.isOwed = false;
       instance.waitedFrames = 0;
     } else {
-      lists.gpu.settled += isCulled && instance.isMoving;
-      EXPECT_TRUE(isCulled || isSettled == instance.isMoving)
-          << "it settles in the next frame that displays it, and in no other";
-      instance.before = instance.shown;
-      instance.isMoving = false;
+      const bool isHeld = instance.description.interpolates && !comesBack &&
+                          engine_.frame() - instance.updatedIn < instance.updatedInterval;
+      const bool settles = instance.isMoving && !isHeld;
+      lists.gpu.settled += isCulled && settles;
+      EXPECT_TRUE(isCulled || isSettled == settles)
+          << "it settles in the next frame that displays it, or when it has reached its pose, and "
+             "in no other";
+      if (settles) {
+        instance.before = instance.shown;
+        instance.isMoving = false;
+      }
       if (instance.isChanged) ++instance.waitedFrames;
       EXPECT_LT(instance.waitedFrames, instance.description.updateInterval) << "it waits too long";
     }
+    instance.earlierBounded =
+        instance.description.interpolates ? instance.before : instance.bounded;
     instance.wasDisplayed = true;
   }
   bool isSkinnedNow(const ModelInstance& instance, bool isPlaced, Lists& lists) {

@@ -448,6 +448,9 @@ typedef struct dermis_instance_desc {
   uint32_t wants_bounds;     // whether to compute the exact box of the skinned positions
   uint32_t update_interval;  // skinned every N-th frame; 0: 1
   uint32_t culled_on_gpu;    // whether a word of the visibility buffer decides, too
+  // Whether the engine draws it between its last two updates, so that it moves smoothly at a larger
+  // interval N, N - 1 frames late. Requires motion in the layout.
+  uint32_t interpolates;
 } dermis_instance_desc;
 // Adds an instance. The next frame that is executed skins it.
 DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
@@ -521,6 +524,9 @@ typedef struct dermis_instance_info {
   dermis_box bounds;          // exact, of the newest complete frame that skinned it
   uint64_t offset;            // of the instance, bytes from the beginning of the output buffer
   dermis_places places;       // offsets count from the beginning of the output buffer
+  // If it interpolates, otherwise 1: draw mix(previous, current, interpolation), which has moved by
+  // (current - previous) * motion_scale since the last frame.
+  float interpolation, motion_scale;
 } dermis_instance_info;
 // Says where an instance is.
 DERMIS_C_API dermis_code dermis_instance_contents(const dermis_scene* scene,

@@ -179,9 +179,9 @@ struct VertexLayout {
   VertexFormat normals = VertexFormat::none;
   /// `isTangentFormat`, or `none`. It must be `none` if the mesh has no tangents.
   VertexFormat tangents = VertexFormat::none;
-  /// Whether there are previous positions, in the format of the positions. In a scene they are the
-  /// positions that the output had in the last committed frame; the current ones if the instance
-  /// was not visible in that frame, or motion restarts.
+  /// Whether there are previous positions, in the format of the positions. In a scene: those of the
+  /// last committed frame (of the update before, if an instance `interpolates`); the current ones
+  /// if it was not visible in that frame, or motion restarts.
   bool motion = false;
   /// If false, vertices are interleaved: one after the other, each with its position, normal,
   /// tangent and previous position at multiples of `formatAlignment`. If true, there is one

@@ -128,6 +128,13 @@ struct InstanceDescription {
   /// GPU finds visible between its turns (`culledOnGpu`) shows the pose of its last turn if it was
   /// visible then, otherwise that of this frame.
   std::uint32_t updateInterval = 1;
+  /// Whether the engine draws the instance between its last two updates, so that it moves smoothly
+  /// at a larger update interval N. Previous positions are then those of the update before, and
+  /// stay until the next one, or until N frames have passed without one. `InstanceOutput` has what
+  /// the vertex shader needs. The instance shows each pose N - 1 frames late. Where frame numbers
+  /// are skipped, or it is skinned before N frames have passed, it jumps. Requires `motion` in the
+  /// layout.
+  bool interpolates = false;
   /// Whether a word of the visibility buffer, too, decides in each frame if the instance is
   /// visible: 0 means invisible. `InstanceChange::visible` must be true as well. An invisible
   /// instance is neither skinned nor settled (`Job::settles`).
@@ -191,6 +198,11 @@ struct InstanceOutput {
   /// stride, so that a draw can use `firstVertex` instead of a vertex-buffer offset.
   std::uint64_t offset = 0;
   VertexPlaces places;  ///< the offsets count from the beginning of the buffer
+  /// Draw mix(previous, current, interpolation) if the instance interpolates. It changes in every
+  /// frame that is executed. 1 if the instance does not interpolate, or rests.
+  float interpolation = 1;
+  /// What is drawn has then moved by (current - previous) * motionScale since the last frame.
+  float motionScale = 1;
 };
 
 /// Indices of a mesh in the index buffer of the engine.
@@ -308,10 +320,10 @@ class DERMIS_CORE_API Scene {
   Result<PoseHandle> pose(FigureHandle figure, std::uint32_t skin = 0) const;
 
   /// Adds an instance. The next frame skins it. Fails with `invalidArgument` if the description
-  /// breaks a rule of `Job`, with `missingFeature` or `limitExceeded` as `makePlan` does, and with
-  /// `limitExceeded` if there is no room for it. `compact` may make room in the output. On the CPU
-  /// it also fails with `invalidArgument` for an instance that is `culledOnGpu`, and for methods
-  /// that are `isForComparison`.
+  /// breaks a rule of `Job` or interpolates without motion, with `missingFeature` or
+  /// `limitExceeded` as `makePlan` does, and with `limitExceeded` if there is no room for it.
+  /// `compact` may make room in the output. On the CPU it also fails with `invalidArgument` for an
+  /// instance that is `culledOnGpu`, and for methods that are `isForComparison`.
   Result<InstanceHandle> addInstance(const InstanceDescription& description);
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);
@@ -423,7 +435,9 @@ class DERMIS_CORE_API Scene {
 
   /// The exact box of the positions, from the newest complete frame that skinned the instance.
   /// Empty if there is no such frame, if `InstanceDescription::bounds` is false, or if
-  /// `InstanceResult::box` is empty.
+  /// `InstanceResult::box` is empty. For an instance that interpolates, it contains the previous
+  /// positions, too, until a complete frame has settled or restarted them. If the GPU culls it, it
+  /// may contain those before a restart that only the GPU knows of, for N frames.
   Result<std::optional<Box>> bounds(InstanceHandle instance) const;
 
   /// The index of the instance's word in the visibility buffer (`culledOnGpu`), as long as it
@@ -525,10 +539,11 @@ class DERMIS_CORE_API SceneCommands {
   Result<void> commit();
   /// For read-back buffers that are not mapped: reads the results of a complete frame. Call it
   /// after `beginFrame`, for each complete frame in ascending order. Boxes of a frame that is left
-  /// out are missing until the instance is skinned again. `bytes` are those of the buffer that the
-  /// commands of the frame copied to; empty if they copied nothing. Fails with `invalidArgument` if
-  /// the frame is not complete, not newer than the last one that was read back, or not one of the
-  /// last `framesInFlight` that were committed, and if `bytes` is smaller than what was copied.
+  /// out are missing until the instance is skinned again; twice if it interpolates. `bytes` are
+  /// those of the buffer that the commands of the frame copied to; empty if they copied nothing.
+  /// Fails with `invalidArgument` if the frame is not complete, not newer than the last one that
+  /// was read back, or not one of the last `framesInFlight` that were committed, and if `bytes` is
+  /// smaller than what was copied.
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
 
   /// The number of the output buffer as of the last `commit`. It changes when the output grows;

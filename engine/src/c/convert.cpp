@@ -231,6 +231,7 @@ InstanceDescription instanceOf(const dermis_instance_desc& desc) {
   result.bounds = desc.wants_bounds != 0;
   if (desc.update_interval != 0) result.updateInterval = desc.update_interval;
   result.culledOnGpu = desc.culled_on_gpu != 0;
+  result.interpolates = desc.interpolates != 0;
   return result;
 }
 

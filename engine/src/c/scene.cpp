@@ -159,6 +159,8 @@ dermis_code dermis_instance_contents(const dermis_scene* scene, dermis_instance 
     result.mesh = handleTo<dermis_mesh>(output.mesh);
     result.offset = output.offset;
     result.places = placesOf(output.places);
+    result.interpolation = output.interpolation;
+    result.motion_scale = output.motionScale;
     if (const std::optional<Box> bounds = must(source.bounds(handle))) {
       result.has_bounds = 1;
       result.bounds = boxOf(*bounds);

@@ -167,6 +167,7 @@ struct InstanceState {
   bool isListed = false;  ///< among the pending
   bool isCulled = false;
   bool hasMotion = false;
+  bool interpolates = false;
   bool isMoving = false;  ///< previous positions may differ, as of the last record
 };
 
@@ -194,6 +195,11 @@ struct SceneInstance {
   std::uint32_t firstVersion = 0;
   std::uint32_t culledIndex = notUsed;
 
+  // Of those that interpolate.
+  std::uint64_t updatedIn = 0;        ///< the last frame that skinned it or made a version
+  std::uint32_t updatedInterval = 1;  ///< its update interval then
+  std::uint64_t heldIn = 0;           ///< the last plan that did not settle it yet
+
   // Rarely read.
   MeshHandle mesh;
   PoseHandle poseHandle;
@@ -208,6 +214,14 @@ struct SceneInstance {
   const Place& place() const { return shown ? *shown : target; }
 };
 
+/// What a frame does with the previous positions of an instance that interpolates, by which its
+/// box is known.
+enum class BoxChange : std::uint8_t {
+  moves,         ///< they become the current positions of the frame before
+  rests,         ///< they become those of this frame
+  mayBeSkinned,  ///< the GPU may skin the instance, which then restarts; otherwise they stay
+};
+
 struct SceneBooks {
   SceneBooks(const SceneSetup& setup, const SceneOwner& owner);
 
@@ -219,6 +233,11 @@ struct SceneBooks {
   struct RetiredBuffer {
     std::uint64_t frame;
     std::uint32_t number;
+  };
+  struct NotedBox {
+    std::uint32_t result;  ///< its number
+    BoxChange change;
+    std::uint64_t firstFrame;  ///< of the instance; a result of a frame before is another's
   };
   /// A buffer of poses. Addresses must stay the same: `Retired` has them.
   struct PoseStore {
@@ -356,10 +375,13 @@ struct SceneBooks {
   void gatherCulled();
   void gatherMoves();
   void gatherResults();
+  void readEarlierBoxes(std::span<const NotedBox> boxes);
   void readHistory(std::span<const std::byte> records);
   void addDue(std::uint32_t index, bool restarts);
   void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
   bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
+  bool holds(std::uint32_t index) const;
+  void noteBox(std::uint32_t index, BoxChange change);
   /// After record number `record`, modulo 2³².
   static View viewOf(const InstanceState& state, std::uint32_t record) {
     return state.turned == record ? state.view : after(state.view, ViewEvent::execute);
@@ -443,6 +465,7 @@ struct SceneBooks {
   };
   std::vector<Due> due_;  ///< to skin
   std::vector<std::uint32_t> settling_;
+  std::vector<InstanceHandle> held_;  ///< of `moving_`: to be settled by a later frame
   struct Versioned {
     std::uint32_t index, version;
   };
@@ -456,6 +479,8 @@ struct SceneBooks {
   std::vector<CopyCommand> moves_;
   std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
   std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them
+  std::vector<NotedBox> notedBoxes_;
+  std::vector<InstanceResult> replacedResults_;  ///< scratch: of these, before a frame is read back
   std::vector<CopyCommand> resultCopies_, growth_;
   CopyCommand historyCopy_ = {};  ///< what `ReadBack::history` becomes
   std::vector<UploadCommand> uploads_;
@@ -468,6 +493,7 @@ struct SceneBooks {
     std::uint64_t frame = 0;
     bool hasCounters = false;
     std::vector<CopyCommand> results;
+    std::vector<NotedBox> boxes;
     CopyCommand history = {};  ///< no bytes if all that are culled on the GPU were written before
     SceneBufferMemory buffer;
   };
@@ -480,7 +506,8 @@ struct SceneBooks {
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
   CullingStatistics culling_;
   std::vector<InstanceResult> latestResults_;  ///< by number, as they were last read back …
-  std::vector<std::uint64_t> resultFrames_;    ///< … in these frames
+  std::vector<InstanceResult> earlierResults_;  ///< … of previous positions, if it interpolates …
+  std::vector<std::uint64_t> resultFrames_;     ///< … in these frames
 };
 
 /// How owners reach their scene.

@@ -13,11 +13,13 @@
 namespace dermis {
 namespace {
 
-std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion, bool restarts) {
+std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion, bool restarts,
+                          bool holds) {
   std::uint32_t flags = instance.extras.result != notUsed ? abi::INSTANCE_HAS_RESULT : 0u;
   if (hasMotion) {
     flags |= abi::INSTANCE_HAS_MOTION;
     if (restarts) flags |= abi::INSTANCE_RESTARTS;
+    if (holds) flags |= abi::INSTANCE_HOLDS;
   }
   return flags;
 }
@@ -30,6 +32,20 @@ std::uint32_t culledFlags(const SceneInstance& instance, bool hasMotion, bool re
 bool SceneBooks::isOnBeat(std::uint32_t interval, std::uint32_t pose) const {
   const std::uint64_t beat = pose;
   return (frame_ + beat) / interval != (recordedFrame_ + beat) / interval;
+}
+
+/// Whether the frame draws the instance between its last two updates, if it is not skinned again.
+bool SceneBooks::holds(std::uint32_t index) const {
+  const InstanceState& state = states_[index];
+  if (!state.interpolates || viewOf(state, recordNumber()) != View::shown) return false;
+  const SceneInstance& instance = instances_.at(index);
+  return frame_ - instance.updatedIn < instance.updatedInterval;
+}
+
+void SceneBooks::noteBox(std::uint32_t index, BoxChange change) {
+  const SceneInstance& instance = instances_.at(index);
+  if (states_[index].interpolates && instance.bounds)
+    notedBoxes_.push_back({instance.extras.result, change, instance.firstFrame});
 }
 
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
@@ -91,6 +107,7 @@ void SceneBooks::addDue(std::uint32_t index, bool restarts) {
     work_.clearedResults.push_back(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
   }
+  noteBox(index, restarts ? BoxChange::rests : BoxChange::moves);
   planned_.skinnedVertices += instance.vertexCount;
   planned_.writtenBytes += std::uint64_t{instance.vertexCount} * instance.vertexBytes;
 }
@@ -115,15 +132,21 @@ void SceneBooks::gatherPending() {
 
 /// An instance that moved when it was last displayed, and is now displayed without being skinned,
 /// is at rest: its previous positions become the current ones. Instances that leave the view are
-/// not settled, since they are usually skinned when they return.
+/// not settled, since they are usually skinned when they return. Those that interpolate come to
+/// rest an update interval later, or when they return.
 void SceneBooks::gatherSettling() {
   for (const InstanceHandle handle : moving_) {
     SceneInstance* instance = instances_.find(handle);
     if (instance == nullptr || instance->plannedIn == planNumber_ ||
         !isDisplayed(states_[handle.index].view))
       continue;
+    if (holds(handle.index)) {
+      if (std::exchange(instance->heldIn, planNumber_) != planNumber_) held_.push_back(handle);
+      continue;
+    }
     instance->plannedIn = planNumber_;
     settling_.push_back(handle.index);
+    noteBox(handle.index, BoxChange::rests);
     addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
   }
 }
@@ -154,7 +177,13 @@ void SceneBooks::gatherCulled() {
     const Candidate candidate{index, version};
     // One that the GPU has yet to show in this version comes back, and restarts for that.
     const bool restarts = isNew && state.need == Need::restart;
-    addRuns(instance, culledFlags(instance, state.hasMotion, restarts), &candidate);
+    const bool isHeld = !isNew && holds(index);
+    if (isNew) {
+      noteBox(index, restarts ? BoxChange::rests : BoxChange::moves);
+    } else {
+      noteBox(index, isHeld ? BoxChange::mayBeSkinned : BoxChange::rests);
+    }
+    addRuns(instance, culledFlags(instance, state.hasMotion, restarts, isHeld), &candidate);
   }
 }
 
@@ -204,12 +233,14 @@ Result<void> SceneBooks::gather() {
   isPlanned_ = false;
   due_.clear();
   settling_.clear();
+  held_.clear();
   versioned_.clear();
   conversions_.clear();
   sampling_.clear();
   moves_.clear();
   plannedResults_.clear();
   resultCopies_.clear();
+  notedBoxes_.clear();
   planned_ = {};
   work_.begin(groups_);
   gatherPoses();
@@ -323,6 +354,9 @@ void SceneBooks::commitInstance(std::uint32_t index) {
   state.need = Need::none;
   if (!state.isCulled) instance.isWritten = true;
   if (instance.firstFrame == 0) instance.firstFrame = frame_;
+  if (!state.interpolates) return;
+  instance.updatedIn = frame_;
+  instance.updatedInterval = state.updateInterval;
 }
 
 Result<void> SceneBooks::commit() {
@@ -339,6 +373,7 @@ Result<void> SceneBooks::commit() {
   readBack.frame = frame_;
   readBack.hasCounters = culls;
   readBack.results.swap(resultCopies_);
+  readBack.boxes.swap(notedBoxes_);
   readBack.history = historyCopy_;
   for (GrowingBuffer* buffer : keptBuffers())
     buffer->copied = std::exchange(buffer->before, SceneBufferMemory());
@@ -351,7 +386,7 @@ Result<void> SceneBooks::commit() {
   clipUploads_.clear();
   skinned_.clear();
   settled_.clear();
-  moving_.clear();
+  moving_.swap(held_);
   for (const Conversion& conversion : conversions_) {
     ScenePose& pose = poses_.at(conversion.pose.index);
     pose.forms[conversion.form].version = pose.version;
@@ -538,6 +573,12 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     culling_.settledInstances = counted.settled;
     culling_.workgroups = counted.workgroups;
   }
+  replacedResults_.clear();
+  for (const NotedBox& box : found->boxes) {
+    const bool isKnown =
+        box.result < resultFrames_.size() && resultFrames_[box.result] >= box.firstFrame;
+    replacedResults_.push_back(isKnown ? latestResults_[box.result] : InstanceResult());
+  }
   for (const CopyCommand& copy : found->results) {
     // All of it is in `bytes`.
     const auto first = static_cast<std::size_t>(copy.fromOffset / sizeof(InstanceResult));
@@ -548,8 +589,23 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     std::memcpy(&latestResults_[first], bytes.data() + copy.toOffset, size);
     std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
+  readEarlierBoxes(found->boxes);
   readHistory(bytes.subspan(history.toOffset, history.size));
   return {};
+}
+
+/// Tells where previous positions are, once the results of the frame are in `latestResults_`.
+void SceneBooks::readEarlierBoxes(std::span<const NotedBox> boxes) {
+  earlierResults_.resize(latestResults_.size());
+  for (std::size_t index = 0; index < boxes.size(); ++index) {
+    const auto [number, change, firstFrame] = boxes[index];
+    if (number >= latestResults_.size()) continue;  // no frame that was read back has skinned it
+    const InstanceResult& latest = latestResults_[number];
+    const InstanceResult& replaced = replacedResults_[index];
+    const bool stays =
+        change == BoxChange::mayBeSkinned && std::memcmp(&latest, &replaced, sizeof(latest)) == 0;
+    if (!stays) earlierResults_[number] = change == BoxChange::moves ? replaced : latest;
+  }
 }
 
 /// Tells which instances that are culled on the GPU have been skinned where they are shown.
@@ -575,7 +631,15 @@ Result<std::optional<Box>> Scene::bounds(InstanceHandle handle) const {
   const std::uint32_t result = instance->extras.result;
   if (result >= books.resultFrames_.size() || books.resultFrames_[result] < instance->firstFrame)
     return std::optional<Box>();
-  return books.latestResults_[result].box();
+  InstanceResult both = books.latestResults_[result];
+  if (books.states_[handle.index].interpolates) {
+    const InstanceResult& earlier = books.earlierResults_[result];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      both.orderedMin[axis] = std::min(both.orderedMin[axis], earlier.orderedMin[axis]);
+      both.orderedMax[axis] = std::max(both.orderedMax[axis], earlier.orderedMax[axis]);
+    }
+  }
+  return both.box();
 }
 
 }  // namespace dermis

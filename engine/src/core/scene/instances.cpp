@@ -6,6 +6,7 @@
 
 #include "plan/check.h"
 #include "scene/books.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {
@@ -281,6 +282,8 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   const bool isCulled = description.culledOnGpu;
   if (books.owner_.isCpu && isCulled)
     return invalid("an instance that is culled on the GPU cannot be skinned on the CPU");
+  if (description.interpolates && !description.layout.motion)
+    return invalid("the instance interpolates, but its layout has no previous positions (motion)");
   instance.mesh = description.mesh;
   instance.poseHandle = description.pose;
   instance.layout = description.layout;
@@ -326,6 +329,7 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   state.updateInterval = description.updateInterval;
   state.isCulled = isCulled;
   state.hasMotion = description.layout.motion;
+  state.interpolates = description.interpolates;
   books.link(handle.index);
   if (isCulled) {
     books.instances_.at(handle.index).culledIndex =
@@ -612,6 +616,15 @@ Result<InstanceOutput> Scene::output(InstanceHandle handle) const {
   output.mesh = place.mesh;
   output.offset = offset;
   output.places = *places;
+  // The CPU does not know whether one that is culled on the GPU moves. If not, any number is right.
+  const InstanceState& state = books.states_[handle.index];
+  const bool moves = state.isCulled ? instance->version != 0 : state.isMoving;
+  if (!state.interpolates || !moves) return output;
+  const std::uint64_t interval = instance->updatedInterval;
+  const std::uint64_t elapsed = books.recordedFrame_ - instance->updatedIn + 1;
+  output.motionScale = 1.0f / static_cast<float>(interval);
+  output.interpolation =
+      static_cast<float>(std::min(elapsed, interval)) / static_cast<float>(interval);
   return output;
 }
 
