@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "clip_rig.h"
 #include "lone_figure.h"
 #include "played_clips.h"
+#include "smooth_walk.h"
+#include "system_engine.h"
 #include "test_device.h"
 
 namespace dermis::test {
@@ -67,6 +70,23 @@ TEST(ClipsOnDevice, ABankThatMovesNothingGivesTheRestPose) {
     must(samplePose(*rig.bank, {}, skin, expected));
     EXPECT_TRUE(areSame(rig.sample(std::span<const ClipLayer>(), skin), expected));
   }
+}
+
+TEST(SmoothWalkOnDevice, SeldomUpdatesAreAsSmoothAsTheBarsSay) {
+  std::string reason;
+  samples::OpenDevice* const open = testDevice(true, reason);
+  ASSERT_NE(open, nullptr) << reason;
+  const auto data = testDataFolder();
+  if (!data) GTEST_SKIP() << noTestData;
+  SmoothWalk(*data).check<SystemEngine>(
+      [&](std::optional<SystemEngine>& engine) {
+        vulkan::SceneRecorderDescription description;
+        description.outputUsage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+        engine.emplace(*open->device, open->context, description);
+      },
+      [](SystemEngine& engine, const InstanceDescription& instance) {
+        must(engine.recorder().prepare(instance));
+      });
 }
 
 const auto* const onDevice = ::testing::AddGlobalTestEnvironment(new OnDevice);
