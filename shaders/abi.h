@@ -183,7 +183,7 @@ DERMIS_CONSTANT STEP_WORDS = 4u;
 
 // ---- Records. A struct of scalars has the same layout in C++ and in std430. NAME_WORDS is the
 // size of a record in the tables or in a packed mesh. The tables are one buffer of words. Records
-// in it begin at multiples of four words, except ActiveMorph and CandidateRecord.
+// in it begin at multiples of four words, except ActiveMorph.
 
 // A pose that the palette kernel converts. Offsets into the poses and palettes buffers count units
 // of 16 bytes.
@@ -193,9 +193,10 @@ struct PaletteRecord {
   // pose may scale. For linear blending in a scene: only the joint matrices.
   uint place;
   uint jointCount;
-  uint reserved;
+  uint needed;  // 0: nothing is converted, unless the visibility kernel sets it
 };
 DERMIS_CONSTANT PALETTE_WORDS = 4u;
+DERMIS_CONSTANT PALETTE_NEEDED = 3u;  // the word of `needed`
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
@@ -223,10 +224,10 @@ struct FigureRecord {
   uint
       matrices;  // unit of the palettes buffer: the local transforms of its nodes, then global ones
   uint poses;    // unit of the poses buffer: the joints of its first pose, then those of the others
-  uint layerCount;
-  uint bank;    // word offset of its BankRecord
-  float time0;  // seconds inside the clip
-  uint layer0;  // clip, 10 bits; mask, 5 bits; LAYER_ADDITIVE; weight as float16
+  uint layerCount;  // and FIGURE_NEEDED; without it, nothing is sampled
+  uint bank;        // word offset of its BankRecord
+  float time0;      // seconds inside the clip
+  uint layer0;      // clip, 10 bits; mask, 5 bits; LAYER_ADDITIVE; weight as float16
   float time1;
   uint layer1;
   float time2;
@@ -235,6 +236,8 @@ struct FigureRecord {
   uint layer3;
 };
 DERMIS_CONSTANT FIGURE_WORDS = 12u;
+DERMIS_CONSTANT FIGURE_LAYER_COUNT = 2u;      // the word of `layerCount`
+DERMIS_CONSTANT FIGURE_NEEDED = 0x80000000u;  // also set by the visibility kernel
 DERMIS_CONSTANT LAYER_ADDITIVE = 0x8000u;
 DERMIS_CONSTANT UNITS_OF_TRANSFORM = 3u;  // the rows of a 3×4 matrix
 
@@ -365,8 +368,11 @@ struct CandidateRecord {
   // Identifies the skinned state that the output should have. No two instances, and no two states
   // of one instance, have the same version.
   uint version;
+  // What must be made if it is skinned: word offsets of its FigureRecord and PaletteRecord, or 0.
+  uint figure;
+  uint palette;
 };
-DERMIS_CONSTANT CANDIDATE_WORDS = 2u;
+DERMIS_CONSTANT CANDIDATE_WORDS = 4u;
 
 // One for each dispatch that skins such instances.
 struct CulledDispatchRecord {

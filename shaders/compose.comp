@@ -33,6 +33,7 @@ void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
   uvec4 figure = tableUnit(push.figures + number * FIGURE_WORDS);  // the first words of a FigureRecord
+  if ((figure.z & FIGURE_NEEDED) == 0u) return;
   BankRecord bank = loadBank(figure.w);
   BandRecord band = loadBand(figure.w + BANK_WORDS + push.band * BAND_WORDS);
   for (uint index = gl_LocalInvocationID.x; index < band.stepCount; index += gl_WorkGroupSize.x) {

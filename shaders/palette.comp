@@ -72,6 +72,7 @@ void main() {
   uint number = workgroupNumber();
   if (number >= push.workgroupCount) return;
   PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
+  if (palette.needed == 0u) return;
   if (METHOD == METHOD_LINEAR) {
     uint units = palette.jointCount * UNITS_OF_MATRIX;
     for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x)

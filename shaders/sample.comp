@@ -102,8 +102,9 @@ void main() {
   if (number >= push.workgroupCount) return;
   uint record = push.figures + number * FIGURE_WORDS;
   uvec4 figure = tableUnit(record);  // the first words of a FigureRecord
+  if ((figure.z & FIGURE_NEEDED) == 0u) return;
   uint firstLayer = record + 4u;
-  uint layersEnd = firstLayer + 2u * figure.z;
+  uint layersEnd = firstLayer + 2u * (figure.z & ~FIGURE_NEEDED);
   BankRecord bank = loadBank(figure.w);
   uvec4 offsets = clipUnit((bank.clips + CLIPS_OFFSETS) / 4u);
   for (uint node = gl_LocalInvocationID.x; node < bank.nodeCount; node += gl_WorkGroupSize.x) {

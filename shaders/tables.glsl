@@ -55,7 +55,10 @@ ExtensionRecord loadExtension(uint word) {
   return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
 }
 
-CandidateRecord loadCandidate(uint word) { return CandidateRecord(tables[word], tables[word + 1u]); }
+CandidateRecord loadCandidate(uint word) {
+  uvec4 a = tableUnit(word);
+  return CandidateRecord(a.x, a.y, a.z, a.w);
+}
 
 CulledDispatchRecord loadCulledDispatch(uint word) {
   uvec4 a = tableUnit(word);

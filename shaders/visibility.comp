@@ -5,7 +5,7 @@
 // Chooses, among the instances that are culled on the GPU, those that are visible and have something new to show. In the first pass
 // (VISIBILITY_CHOOSES) a workgroup processes the instances of one group, and moves the records of the chosen ones to the front, in
 // their order (a prefix sum). In the second pass (VISIBILITY_COUNTS) a workgroup processes the groups of one dispatch: it writes
-// their `workgroupEnd`, and the arguments of the dispatch.
+// their `workgroupEnd`, and the arguments of the dispatch. The first also marks the figures and palettes that the chosen ones need.
 
 #define TABLES_ARE_WRITTEN
 #define RESULTS_BINDING BINDING_VISIBLE_RESULTS
@@ -47,6 +47,9 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
   history[slot].lastVisible = push.frame;
   if (history[slot].version != candidate.version) {
     history[slot].version = candidate.version;
+    // Several instances may have one pose.
+    if (candidate.figure != 0u) atomicOr(tables[candidate.figure + FIGURE_LAYER_COUNT], FIGURE_NEEDED);
+    if (candidate.palette != 0u) atomicOr(tables[candidate.palette + PALETTE_NEEDED], 1u);
     atomicAdd(counters.skinned, 1u);
     if ((instance.joints & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
     // If the instance was not visible in the previous frame, its stored positions may not be those of that frame.

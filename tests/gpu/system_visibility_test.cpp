@@ -1,6 +1,10 @@
 // What is skipped is not skinned: instances that rest, are hidden by the engine, or culled on the
 // GPU.
 
+#include <cmath>
+#include <cstring>
+
+#include "played_clips.h"
 #include "system_visibility.h"
 
 namespace dermis::test {
@@ -366,6 +370,55 @@ TEST_F(SystemVisibilityTest, ANewInstanceIsNotTakenForTheOneBefore) {
     EXPECT_EQ(completed().settledInstances, away == 0 ? 50u : 10u);
     submit();
   }
+}
+
+// What the GPU culls costs no sampling either; a play is made up for when somebody sees it.
+TEST_F(SystemVisibilityTest, WhatIsCulledOnTheGpuIsNotSampled) {
+  SystemEngine& engine = engine_.emplace(device(), context(), description());
+  const FigureHandle figure =
+      must(engine->addFigure(must(engine->addClips(PackedClips(playedClips())))));
+  InstanceDescription body;
+  body.mesh = engine.addMesh(systemMesh(1, 40, 8, 4));
+  body.pose = must(engine->pose(figure));
+  body.culledOnGpu = true;
+  const InstanceHandle instance = engine.addInstance(body);
+  words_ = must(samples::MappedBuffer::create(device(), engine->visibilityCount() * 4,
+                                              VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
+  const auto frame = [&](bool isVisible) {
+    engine.begin();
+    const std::uint32_t word = isVisible ? 1 : 0;
+    std::memcpy(words_.bytes().data() + must(engine->visibilityIndex(instance)) * sizeof(word),
+                &word, sizeof(word));
+    submit();
+  };
+  const auto play = [&](std::uint32_t number) {
+    const FigurePlay plays{figure, playedLayers(number)};
+    must(engine->play({&plays, 1}));
+  };
+  const auto isPoseOf = [&](std::uint32_t number) {
+    const std::vector<JointMatrix> pose = engine.readPose(body.pose);
+    const std::vector<JointMatrix> wanted = playedPose(number, 0);
+    double largest = 0;
+    for (std::size_t joint = 0; joint < wanted.size(); ++joint) {
+      for (std::size_t i = 0; i < 12; ++i) {
+        const float difference = pose[joint].m[i / 4][i % 4] - wanted[joint].m[i / 4][i % 4];
+        largest = std::max(largest, std::abs(double{difference}));
+      }
+    }
+    return largest < 1e-5;
+  };
+  play(1);
+  frame(true);
+  EXPECT_TRUE(isPoseOf(1));
+  const std::vector<std::byte> shown = engine.read(instance)[positionStream];
+  play(3);
+  frame(false);
+  frame(false);
+  EXPECT_TRUE(isPoseOf(1)) << "nobody saw the other";
+  EXPECT_TRUE(engine.read(instance)[positionStream] == shown);
+  frame(true);
+  EXPECT_TRUE(isPoseOf(3)) << "it was made up for";
+  EXPECT_FALSE(engine.read(instance)[positionStream] == shown);
 }
 
 }  // namespace

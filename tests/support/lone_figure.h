@@ -19,7 +19,6 @@ class LoneFigure {
   FigureHandle figure() const { return figure_; }
 
  private:
-  samples::Device& device_;
   SystemEngine engine_;
   FigureHandle figure_;
 };

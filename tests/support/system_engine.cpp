@@ -57,6 +57,21 @@ void SystemEngine::writeWeights(InstanceHandle instance, std::span<const float> 
   gpuWrites_.push_back({{}, instance, {bytes.begin(), bytes.end()}});
 }
 
+std::vector<JointMatrix> SystemEngine::readPose(PoseHandle handle) {
+  const vulkan::BufferRange range = must(recorder_.poseRange(handle));
+  const samples::MappedBuffer copy = must(
+      samples::MappedBuffer::create(device_, range.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
+  submitNow([&](VkCommandBuffer commandBuffer) {
+    recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    const VkBufferCopy all{range.offset, 0, range.size};
+    device_.functions().CmdCopyBuffer(commandBuffer, range.buffer, copy.handle(), 1, &all);
+    recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+  });
+  std::vector<JointMatrix> pose(range.size / sizeof(JointMatrix));
+  std::memcpy(pose.data(), copy.bytes().data(), range.size);
+  return pose;
+}
+
 void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
   std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return !rangeOf(write).ok(); });
   if (gpuWrites_.empty()) return;

@@ -81,6 +81,8 @@ class SystemEngine {
   Streams read(std::span<const std::byte> bytes, InstanceHandle instance) const;
   std::uint32_t vertexCount(MeshHandle mesh) const { return vertexCounts_.at(key(mesh)); }
 
+  /// A pose that the GPU writes, or that belongs to a figure.
+  std::vector<JointMatrix> readPose(PoseHandle pose);
   /// Submits what `record` records, and waits for it and all before.
   void submitNow(const std::function<void(VkCommandBuffer)>& record);
   void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Barrier& barrier) const;

@@ -233,8 +233,11 @@ struct FrameStatistics {
   std::uint32_t instances = 0;  ///< in the scene
   std::uint32_t skinnedInstances = 0;
   std::uint32_t settledInstances = 0;  ///< instances of which only previous positions are written
-  std::uint32_t sampledFigures = 0;    ///< figures whose poses were sampled from clips
-  std::uint32_t convertedPoses = 0;    ///< a pose counts once for each form that methods need
+  /// Figures whose poses were sampled from clips. Those that only instances culled on the GPU need
+  /// are counted in every frame in which they may be.
+  std::uint32_t sampledFigures = 0;
+  /// A pose counts once for each form that methods need. Poses of figures count as these do.
+  std::uint32_t convertedPoses = 0;
   std::uint32_t culledCandidates = 0;  ///< instances that the visibility kernel looks at
   std::uint64_t skinnedVertices = 0;
   std::uint64_t writtenBytes = 0;  ///< of skinned vertices

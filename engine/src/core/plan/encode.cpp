@@ -139,7 +139,9 @@ Result<void> Encoder::addFigureDispatches() {
     }
   }
   const std::uint32_t figures = wordsOf(tables);
+  figureWords_.clear();
   for (const std::vector<abi::FigureRecord>& records : work_->figures) {
+    figureWords_.push_back(wordsOf(tables));
     for (abi::FigureRecord record : records) {
       record.bank *= static_cast<std::uint32_t>(bankWords);
       tables.resize(tables.size() + abi::FIGURE_WORDS);
@@ -172,11 +174,13 @@ Result<void> Encoder::addFigureDispatches() {
 }
 
 Result<void> Encoder::addPaletteDispatches() {
+  paletteWords_.clear();
   for (std::uint32_t buffer = 0; buffer < work_->poses.size(); ++buffer) {
     const Work::Poses& lists = work_->poses[buffer];
     for (std::size_t form = 0; form < paletteFormCount; ++form) {
       for (std::size_t promise = 0; promise < jointPromiseCount; ++promise) {
         const std::span<const abi::PaletteRecord> records = lists.records[form][promise];
+        paletteWords_.push_back(wordsOf(plan_->tables));
         if (records.empty()) continue;
         const Variant variant = paletteVariant(
             static_cast<PaletteForm>(form), static_cast<JointPromise>(promise), limits_, tuning_);
@@ -458,18 +462,31 @@ void Encoder::markEvenlySpaced(std::uint32_t firstRecord) {
   }
 }
 
-/// In the order of the instance records, which are the last.
+std::uint32_t Encoder::figureWord(const Candidate& candidate) const {
+  if (candidate.figure == notUsed) return 0;
+  const auto& [buffer, place] = work_->figurePlaces[candidate.figure];
+  return figureWords_[buffer] + place * abi::FIGURE_WORDS;
+}
+std::uint32_t Encoder::paletteWord(const Candidate& candidate) const {
+  const PalettePlace& palette = candidate.palette;
+  if (palette.index == notUsed) return 0;
+  return paletteWords_[palette.list()] + palette.index * abi::PALETTE_WORDS;
+}
+
+/// In the order of the instance records.
 void Encoder::appendCandidates() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   culled_.firstInstance =
       static_cast<std::uint32_t>(work_->instances.size() - work_->culled.size());
+  alignToUnit(tables);
   culled_.candidates = wordsOf(tables);
   tables.resize(tables.size() + work_->culled.size() * abi::CANDIDATE_WORDS);
   for (std::size_t index = 0; index < work_->culled.size(); ++index) {
     const Candidate& candidate = work_->culled[index].candidate;
     const std::size_t number = culledPlaces_[index] - culled_.firstInstance;
     store(tables, culled_.candidates + number * abi::CANDIDATE_WORDS,
-          abi::CandidateRecord{candidate.slot, candidate.version});
+          abi::CandidateRecord{candidate.slot, candidate.version, figureWord(candidate),
+                               paletteWord(candidate)});
   }
 }
 

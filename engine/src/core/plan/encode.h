@@ -63,6 +63,8 @@ class Encoder {
   void writeInstances();
   void markEvenlySpaced(std::uint32_t firstRecord);
   std::uint32_t appendExtension(const InstanceExtras& extras);
+  std::uint32_t figureWord(const Candidate& candidate) const;
+  std::uint32_t paletteWord(const Candidate& candidate) const;
   void appendCandidates();
   void appendCulledDispatches();
   Result<void> addVisibilityDispatches(std::uint32_t record);
@@ -75,6 +77,8 @@ class Encoder {
   DeviceLimits limits_;
   Tuning tuning_;
   std::uint32_t paletteStage_ = 0;           ///< of the palette kernel
+  std::vector<std::uint32_t> figureWords_;   ///< of the first record of each pose buffer
+  std::vector<std::uint32_t> paletteWords_;  ///< the same of each list of palettes
   std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
   std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records

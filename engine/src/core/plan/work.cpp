@@ -28,6 +28,7 @@ void Work::begin(Groups& groupsInUse) {
   }
   banks.clear();
   for (std::vector<abi::FigureRecord>& records : figures) records.clear();
+  figurePlaces.clear();
   poseCount = 0;
   clearedResults.clear();
   instances.clear();
@@ -48,6 +49,7 @@ void Work::addFigure(std::uint32_t poseBuffer, const Bank& bank, abi::FigureReco
   }
   if (record.bank == notUsed) record.bank = static_cast<std::uint32_t>(banks.size() - 1);
   while (figures.size() <= poseBuffer) figures.emplace_back();
+  figurePlaces.push_back({poseBuffer, static_cast<std::uint32_t>(figures[poseBuffer].size())});
   figures[poseBuffer].push_back(record);
 }
 

@@ -44,10 +44,28 @@ struct InstanceExtras {
 /// bits.
 void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active);
 
+/// Where a palette that is converted is in the work.
+struct PalettePlace {
+  std::uint32_t buffer = 0;
+  PaletteForm form = PaletteForm::dualQuaternions;
+  JointPromise promise = JointPromise::scaling;
+  std::uint32_t index = notUsed;  ///< in the list of these
+
+  /// The number of the list.
+  std::size_t list() const {
+    return (buffer * paletteFormCount + static_cast<std::size_t>(form)) * jointPromiseCount +
+           static_cast<std::size_t>(promise);
+  }
+};
+
 /// The data with which the GPU decides whether an instance is skinned.
 struct Candidate {
   std::uint32_t slot = 0;     ///< its place in the visibility and history buffers
   std::uint32_t version = 0;  ///< of the state that it should show; unique within a scene
+  // What is made only if such an instance is skinned: its figure, by the order in which figures are
+  // added to the work, and its palette; `notUsed`: none.
+  std::uint32_t figure = notUsed;
+  PalettePlace palette = {};
 };
 
 /// The joint matrices that are converted to a palette.
@@ -93,6 +111,8 @@ struct Work {
   /// Whose poses are sampled before they are converted, by pose buffer. `FigureRecord::bank` is an
   /// index into `banks`.
   std::vector<std::vector<abi::FigureRecord>> figures;
+  /// Of each figure, in the order in which they were added: pose buffer, and place in its list.
+  std::vector<std::array<std::uint32_t, 2>> figurePlaces;
   std::vector<Poses> poses;  ///< by pose buffer
   std::uint32_t poseCount = 0;
   std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
@@ -108,15 +128,17 @@ struct Work {
   void begin(Groups& groupsInUse);
   bool isEmpty() const { return poseCount == 0 && clearedResults.empty() && instances.empty(); }
 
-  /// A batch has only pose buffer 0.
-  void addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
-               PaletteForm form, JointPromise promise) {
+  /// A batch has only pose buffer 0. If it is not needed, the GPU decides whether it is.
+  PalettePlace addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
+                       PaletteForm form, JointPromise promise, bool isNeeded = true) {
     while (poses.size() <= source.buffer) poses.emplace_back();
     Poses& lists = poses[source.buffer];
     lists.joints = source.role;
-    lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)].push_back(
-        {source.unit, outputUnit, joints, 0});
+    std::vector<abi::PaletteRecord>& records =
+        lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)];
+    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
     ++poseCount;
+    return {source.buffer, form, promise, static_cast<std::uint32_t>(records.size() - 1)};
   }
   /// What it points to must stay valid while the work is read.
   void add(const Instance& instance) {

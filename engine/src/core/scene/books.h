@@ -95,7 +95,8 @@ struct ScenePose {
   struct Form {
     std::uint32_t unit = notUsed;  ///< the first of its palette
     std::uint64_t version = 0;     ///< of the pose; 0 if it is to be converted again
-    std::uint64_t plannedIn = 0;   ///< the plan that converts it
+    std::uint64_t plannedIn = 0;   ///< the plan that converts it …
+    std::uint32_t place = 0;       ///< … and its place in the list of such palettes
   };
 
   std::uint32_t jointCount = 0;
@@ -143,7 +144,8 @@ struct SceneFigure {
   std::uint64_t version = 1;    ///< of `layers`
   std::uint64_t sampled = 0;    ///< the version that the poses have; 0: to be sampled again
   std::uint64_t plannedIn = 0;  ///< the plan that samples it …
-  std::uint32_t place = 0;      ///< … and its place among those that the plan samples
+  std::uint32_t place = 0;      ///< … its place among those that the plan samples …
+  bool isNeeded = false;        ///< … and whether it does so whatever the GPU culls
   std::uint64_t listedIn = 0;   ///< the plan before which its poses were listed as written
 };
 
@@ -318,7 +320,7 @@ struct SceneBooks {
   }
 
   // figures.cpp
-  void sampleFigure(std::uint32_t index);
+  void sampleFigure(std::uint32_t index, bool isNeeded);
   void gatherFigures();
   std::optional<BankMorphed> findMorphed(const SceneInstance& instance) const;
   void sampleMorphs(SceneInstance& instance);
@@ -401,7 +403,7 @@ struct SceneBooks {
     return actionFor(viewOf(state, recordNumber()), need,
                      state.updateInterval == 1 || isOnBeat(state.updateInterval, pose));
   }
-  void convertPalette(const SceneInstance& instance);
+  void convertPalette(const SceneInstance& instance, bool isCulled);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
   void commitInstance(std::uint32_t index);
@@ -473,6 +475,7 @@ struct SceneBooks {
   struct Conversion {
     PoseHandle pose;
     std::size_t form;
+    bool isNeeded;  ///< whatever the GPU culls
   };
   std::vector<Conversion> conversions_;
   std::vector<std::uint32_t> sampling_;  ///< figures

@@ -212,10 +212,12 @@ std::span<JointMatrix> SceneBooks::matricesOf(const SceneFigure& figure) {
   return {first.data(), static_cast<std::size_t>(figure.joints.size)};
 }
 
-/// For an instance that is skinned with one of its poses.
-void SceneBooks::sampleFigure(std::uint32_t index) {
+/// For an instance that is skinned with one of its poses, or that may be, if the GPU decides. Those
+/// that are skinned come first.
+void SceneBooks::sampleFigure(std::uint32_t index, bool isNeeded) {
   SceneFigure& figure = figures_.at(index);
   if (figure.sampled == figure.version || figure.plannedIn == planNumber_) return;
+  figure.isNeeded = isNeeded;
   figure.plannedIn = planNumber_;
   figure.place = static_cast<std::uint32_t>(sampling_.size());
   sampling_.push_back(index);
@@ -231,7 +233,7 @@ void SceneBooks::gatherFigures() {
     const abi::FigureRecord record{
         .matrices = static_cast<std::uint32_t>(figure.matrices.offset),
         .poses = static_cast<std::uint32_t>(figure.joints.offset) * abi::UNITS_OF_MATRIX,
-        .layerCount = figure.layers.count,
+        .layerCount = figure.layers.count | (figure.isNeeded ? abi::FIGURE_NEEDED : 0u),
         .bank = notUsed,
         .time0 = layers[0].time,
         .layer0 = layers[0].bits,

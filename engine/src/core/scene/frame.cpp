@@ -53,18 +53,22 @@ std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
   return poses_.at(instance.pose).forms[form].unit;
 }
 
-/// Converts a pose once for all instances that read it, and only if one does.
-void SceneBooks::convertPalette(const SceneInstance& instance) {
+/// Converts a pose once for all instances that read it, and only if one does. If all of these are
+/// culled on the GPU, it decides whether a figure is sampled and its pose converted: the CPU does
+/// not know whether that happened, and lists both again in the next frame.
+void SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
   const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.pose);
   ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
-  if (pose.figure != notUsed) sampleFigure(pose.figure);
-  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form)});
+  const bool isNeeded = !isCulled || pose.figure == notUsed;
+  if (pose.figure != notUsed) sampleFigure(pose.figure, isNeeded);
+  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form), isNeeded});
   const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                           pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
-  work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise);
+  converted.place =
+      work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise, isNeeded).index;
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
@@ -100,7 +104,7 @@ void SceneBooks::addDue(std::uint32_t index, bool restarts) {
   SceneInstance& instance = instances_.at(index);
   instance.plannedIn = planNumber_;
   due_.push_back({index, restarts});
-  convertPalette(instance);
+  convertPalette(instance, false);
   if (owner_.isCpu && instance.morphWriter == MorphWriter::clips) sampleMorphs(instance);
   addRuns(instance, states_[index].hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
   if (instance.extras.result != notUsed) {
@@ -173,8 +177,16 @@ void SceneBooks::gatherCulled() {
       if (instance.firstFrame == 0) work_.clearedResults.push_back(instance.extras.result);
       plannedResults_.push_back(instance.extras.result);
     }
-    convertPalette(instance);
-    const Candidate candidate{index, version};
+    convertPalette(instance, true);
+    Candidate candidate{index, version};
+    const ScenePose& pose = poses_.at(instance.pose);
+    const PaletteForm form = paletteForm(instance.method);
+    const ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
+    if (pose.figure != notUsed && converted.plannedIn == planNumber_) {
+      candidate.palette = {pose.buffer, form, pose.promise, converted.place};
+      const SceneFigure& figure = figures_.at(pose.figure);
+      if (figure.plannedIn == planNumber_) candidate.figure = figure.place;
+    }
     // One that the GPU has yet to show in this version comes back, and restarts for that.
     const bool restarts = isNew && state.need == Need::restart;
     const bool isHeld = !isNew && holds(index);
@@ -388,12 +400,13 @@ Result<void> SceneBooks::commit() {
   settled_.clear();
   moving_.swap(held_);
   for (const Conversion& conversion : conversions_) {
+    if (!conversion.isNeeded) continue;
     ScenePose& pose = poses_.at(conversion.pose.index);
     pose.forms[conversion.form].version = pose.version;
   }
   for (const std::uint32_t index : sampling_) {
     SceneFigure& figure = figures_.at(index);
-    figure.sampled = figure.version;
+    if (figure.isNeeded) figure.sampled = figure.version;
   }
   for (const auto& [index, restarts] : due_) {
     InstanceState& state = states_[index];
