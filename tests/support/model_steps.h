@@ -254,7 +254,8 @@ class ModelSteps {
       description.weightsOf = weightedNode(targetsOf(mesh->first));
       if (hasGpu) description.layout = someLayouts()[below(2)];  // in float32
     }
-    description.interpolates = description.layout.motion && chance(50);
+    description.interpolates = description.layout.motion && chance(60);
+    if (description.interpolates) description.updateInterval = 1 + below(6);
     prepare(description);
     if (chance(30))
       tryToAdd([&] { return system().addInstance(description); },
