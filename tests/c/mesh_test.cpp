@@ -27,6 +27,8 @@ static_assert(DERMIS_UNORM8 == static_cast<int>(ComponentType::unorm8));
 static_assert(DERMIS_FORMAT_OCTAHEDRAL8X2 == static_cast<int>(VertexFormat::octahedral8x2));
 static_assert(DERMIS_FORMAT_SNORM16X4 == static_cast<int>(VertexFormat::snorm16x4));
 static_assert(DERMIS_PROMISE_RIGID == static_cast<int>(JointPromise::rigid));
+static_assert(DERMIS_MORPH_WRITER_GPU == static_cast<int>(MorphWriter::gpu));
+static_assert(DERMIS_MORPH_WRITER_CLIPS == static_cast<int>(MorphWriter::clips));
 static_assert(DERMIS_PROBLEM_TANGENT_SIGN == static_cast<int>(MeshProblem::tangentSign));
 static_assert(DERMIS_PROBLEM_JOINT_OUT_OF_RANGE == static_cast<int>(MeshProblem::jointOutOfRange));
 static_assert(DERMIS_PREVIOUS_POSITIONS == static_cast<int>(Stream::previousPositions));

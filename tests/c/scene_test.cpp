@@ -586,15 +586,26 @@ TEST(CCommandsTest, AreThoseOfCpp) {
   instance.mesh = must(same.scene().addMesh(must(pack(source.mesh.view(), 8))));
   std::array<PoseHandle, 2> samePoses;
   must(same.scene().addPoses(samePoses, 8, {.writtenByGpu = true}));
+  dermis_instance instances[2];
+  InstanceHandle sameWritten;
   for (std::size_t i = 0; i < 2; ++i) {
     figure.pose = poses[i];
     instance.pose = samePoses[i];
-    dermis_instance added{};
+    dermis_instance& added = instances[i];
+    figure.morph_writer = i == 0 ? DERMIS_MORPH_WRITER_CPU : DERMIS_MORPH_WRITER_GPU;
+    instance.morphWriter = i == 0 ? MorphWriter::cpu : MorphWriter::gpu;
     expectOk(dermis_add_instance(scene, &figure, &added, &error));
     const InstanceHandle sameInstance = must(same.scene().addInstance(instance));
     dermis_part part{};
     expectOk(dermis_commands_pose_part(commands, poses[i], &part, &error));
     expectPart(part, must(same.posePart(samePoses[i])));
+    if (i == 0) {
+      expectError(dermis_commands_weights_part(commands, added, &part, &error), "morph weights");
+    } else {
+      expectOk(dermis_commands_weights_part(commands, added, &part, &error));
+      expectPart(part, must(same.weightsPart(sameInstance)));
+      sameWritten = sameInstance;
+    }
     dermis_instance_info info = sized<dermis_instance_info>();
     expectOk(dermis_instance_contents(scene, added, &info, &error));
     EXPECT_GE(info.offset, 192u);
@@ -605,6 +616,9 @@ TEST(CCommandsTest, AreThoseOfCpp) {
     must(same.scene().beginFrame(frame, frame - 1));
     expectOk(dermis_mark_written(scene, poses, 2, &error));
     must(same.scene().markWritten(samePoses));
+    expectOk(dermis_mark_morphs_written(scene, &instances[1], 1, &error));
+    must(same.scene().markMorphsWritten({&sameWritten, 1}));
+    expectError(dermis_mark_morphs_written(scene, &instances[0], 1, &error), "morph weights");
     const dermis_command* list = nullptr;
     std::uint32_t count = 0;
     expectOk(dermis_commands_plan(commands, &list, &count, &error));

@@ -253,9 +253,12 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
     dermis_range range{};
     expectOk(dermis_pose_range(recorder, figure.pose, &range, &error));
     EXPECT_EQ(range.byte_count, 8 * sizeof(dermis_joint));
+    figure.morph_writer = DERMIS_MORPH_WRITER_GPU;
     expectOk(dermis_prepare(cContext, scene, &figure, &error));
     dermis_instance instance{};
     expectOk(dermis_add_instance(scene, &figure, &instance, &error));
+    expectOk(dermis_weights_range(recorder, instance, &range, &error));
+    EXPECT_EQ(range.byte_count, source.targets.size() * sizeof(float));
     expectOk(dermis_begin_frame(scene, 1, 0, &error));
     expectOk(dermis_mark_written(scene, &figure.pose, 1, &error));
     expectOk(dermis_record(recorder, commandBuffer, VK_NULL_HANDLE, 0, &error));

@@ -437,6 +437,18 @@ DERMIS_C_API dermis_code dermis_add_poses(dermis_scene* scene, const dermis_pose
 DERMIS_C_API dermis_code dermis_remove_pose(dermis_scene* scene, dermis_pose pose,
                                             dermis_error* error);
 
+// Who writes the morph weights of an instance.
+typedef enum dermis_morph_writer {
+  DERMIS_MORPH_WRITER_CPU = 0,  // `dermis_change_instances`
+  // A GPU pass of the engine, to the same memory (`dermis_weights_range`); the engine then calls
+  // `dermis_mark_morphs_written`.
+  DERMIS_MORPH_WRITER_GPU = 1,
+  // The clips that the figure of its pose plays; while its pose belongs to none, no target is
+  // active.
+  DERMIS_MORPH_WRITER_CLIPS = 2,
+  DERMIS_MORPH_WRITER_INT32 = 0x7fffffff  // not a value
+} dermis_morph_writer;
+
 // An instance.
 typedef struct dermis_instance_desc {
   uint32_t size;
@@ -451,6 +463,10 @@ typedef struct dermis_instance_desc {
   // Whether the engine draws it between its last two updates, so that it moves smoothly at a larger
   // interval N, N - 1 frames late. Requires motion in the layout.
   uint32_t interpolates;
+  dermis_morph_writer morph_writer;  // other than the CPU needs a mesh with morph targets
+  // With `DERMIS_MORPH_WRITER_CLIPS`: the node of the skeleton whose weights drive the instance,
+  // with as many as the mesh has targets.
+  uint32_t weights_of;
 } dermis_instance_desc;
 // Adds an instance. The next frame that is executed skins it.
 DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
@@ -473,6 +489,10 @@ DERMIS_C_API dermis_code dermis_write_poses(dermis_scene* scene, const dermis_po
 // one fails, those before it are marked.
 DERMIS_C_API dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses,
                                              uint32_t count, dermis_error* error);
+// The same for morph weights that a GPU pass of the engine writes.
+DERMIS_C_API dermis_code dermis_mark_morphs_written(dermis_scene* scene,
+                                                    const dermis_instance* instances,
+                                                    uint32_t count, dermis_error* error);
 
 // Which members of a `dermis_change` count. Combine them by |.
 typedef enum dermis_change_bits {
@@ -874,6 +894,11 @@ DERMIS_C_API dermis_code dermis_commands_read_back(dermis_commands* commands, ui
 DERMIS_C_API dermis_code dermis_commands_pose_part(const dermis_commands* commands,
                                                    dermis_pose pose, dermis_part* part,
                                                    dermis_error* error);
+// Where the morph weights of an instance are that a GPU pass of the engine writes: a float for each
+// target of its mesh.
+DERMIS_C_API dermis_code dermis_commands_weights_part(const dermis_commands* commands,
+                                                      dermis_instance instance, dermis_part* part,
+                                                      dermis_error* error);
 
 // How a buffer is used before or after Dermis. Combine uses by |.
 typedef enum dermis_use {
@@ -1289,6 +1314,10 @@ DERMIS_C_API dermis_code dermis_recorder_contents(const dermis_recorder* recorde
 // Where a GPU pass of the engine writes the joint matrices of a pose.
 DERMIS_C_API dermis_code dermis_pose_range(const dermis_recorder* recorder, dermis_pose pose,
                                            dermis_range* range, dermis_error* error);
+// The same for the morph weights of an instance: a float for each target of its mesh.
+DERMIS_C_API dermis_code dermis_weights_range(const dermis_recorder* recorder,
+                                              dermis_instance instance, dermis_range* range,
+                                              dermis_error* error);
 
 #endif  // VULKAN_CORE_H_
 

@@ -227,4 +227,13 @@ dermis_code dermis_commands_pose_part(const dermis_commands* commands, dermis_po
   });
 }
 
+dermis_code dermis_commands_weights_part(const dermis_commands* commands, dermis_instance instance,
+                                         dermis_part* part, dermis_error* error) {
+  return guarded(error, [&] {
+    const dermis_commands& lender = required(commands, "commands");
+    dermis_part& result = required(part, "part");
+    result = partOf(must(lender.commands->weightsPart(handleOf(instance))));
+  });
+}
+
 }  // extern "C"

@@ -232,6 +232,9 @@ InstanceDescription instanceOf(const dermis_instance_desc& desc) {
   if (desc.update_interval != 0) result.updateInterval = desc.update_interval;
   result.culledOnGpu = desc.culled_on_gpu != 0;
   result.interpolates = desc.interpolates != 0;
+  result.morphWriter = static_cast<MorphWriter>(
+      enumerator(desc.morph_writer, DERMIS_MORPH_WRITER_CLIPS, "the morph writer"));
+  result.weightsOf = desc.weights_of;
   return result;
 }
 
@@ -243,6 +246,7 @@ PipelineNeeds needsOf(const dermis_scene* scene, const dermis_instance_desc* cal
   needs.layout = desc.layout;
   needs.bounds = desc.bounds;
   needs.culledOnGpu = desc.culledOnGpu;
+  needs.morphsOnGpu = desc.morphWriter != MorphWriter::cpu;
   return needs;
 }
 

@@ -113,6 +113,17 @@ dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses, u
   });
 }
 
+dermis_code dermis_mark_morphs_written(dermis_scene* scene, const dermis_instance* instances,
+                                       uint32_t count, dermis_error* error) {
+  return guarded(error, [&] {
+    Scene& target = changedScene(scene);
+    std::vector<InstanceHandle> handles;
+    for (const dermis_instance& instance : array(instances, count, "instances"))
+      handles.push_back(handleOf(instance));
+    must(target.markMorphsWritten(handles));
+  });
+}
+
 dermis_code dermis_change_instances(dermis_scene* scene, const dermis_change* changes,
                                     uint32_t count, dermis_error* error) {
   return guarded(error, [&] {
