@@ -163,8 +163,8 @@ std::vector<std::uint32_t> makeGoodBank() {
   skeleton.nodes[1].translation = {0, 1, 0};
   skeleton.nodes[2].parent = 1;
   skeleton.nodes[2].translation = {0.5, 1, 0};
-  const std::array<float, 4> weights{0, 0.5f, 1, 0};
-  skeleton.nodes[2].weights = weights;
+  const std::array<float, 4> atRest{0, 0.5f, 1, 0};
+  skeleton.nodes[2].weights = atRest;
   const std::array<std::uint32_t, 3> joints{0, 2, 1};
   const std::array<JointMatrix, 3> matrices;
   skeleton.skins = {{"all", joints, matrices},
@@ -176,7 +176,7 @@ std::vector<std::uint32_t> makeGoodBank() {
   std::array<ClipView, 3> clips;
   for (ClipView& clip : clips) clip.duration = 1;
   clips[0].channels = {{1, rotation, Interpolation::linear, times, rotations}};
-  clips[0].channels.push_back({2, ChannelPath::weights, Interpolation::linear, times, rotations});
+  clips[0].channels.push_back({2, weights, Interpolation::linear, times, rotations});
   clips[1].channels = {{0, translation, Interpolation::step, times, places},
                        {2, scale, Interpolation::step, times, places}};
   clips[1].wraps = false;
