@@ -368,11 +368,13 @@ struct CandidateRecord {
   // Identifies the skinned state that the output should have. No two instances, and no two states
   // of one instance, have the same version.
   uint version;
-  // What must be made if it is skinned: word offsets of its FigureRecord and PaletteRecord, or 0.
+  // What must be made if it is skinned: word offsets of its FigureRecord and PaletteRecord, or
+  // CANDIDATE_NEEDS_NONE.
   uint figure;
   uint palette;
 };
 DERMIS_CONSTANT CANDIDATE_WORDS = 4u;
+DERMIS_CONSTANT CANDIDATE_NEEDS_NONE = 0xffffffffu;
 
 // One for each dispatch that skins such instances.
 struct CulledDispatchRecord {

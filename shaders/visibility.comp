@@ -48,8 +48,8 @@ bool choose(CandidateRecord candidate, inout InstanceRecord instance) {
   if (history[slot].version != candidate.version) {
     history[slot].version = candidate.version;
     // Several instances may have one pose.
-    if (candidate.figure != 0u) atomicOr(tables[candidate.figure + FIGURE_LAYER_COUNT], FIGURE_NEEDED);
-    if (candidate.palette != 0u) atomicOr(tables[candidate.palette + PALETTE_NEEDED], 1u);
+    if (candidate.figure != CANDIDATE_NEEDS_NONE) atomicOr(tables[candidate.figure + FIGURE_LAYER_COUNT], FIGURE_NEEDED);
+    if (candidate.palette != CANDIDATE_NEEDS_NONE) atomicOr(tables[candidate.palette + PALETTE_NEEDED], 1u);
     atomicAdd(counters.skinned, 1u);
     if ((instance.joints & INSTANCE_HAS_RESULT) != 0u) clearResult(loadExtension(instance.extension).result);
     // If the instance was not visible in the previous frame, its stored positions may not be those of that frame.

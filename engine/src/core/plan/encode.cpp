@@ -463,13 +463,13 @@ void Encoder::markEvenlySpaced(std::uint32_t firstRecord) {
 }
 
 std::uint32_t Encoder::figureWord(const Candidate& candidate) const {
-  if (candidate.figure == notUsed) return 0;
+  if (candidate.figure == notUsed) return abi::CANDIDATE_NEEDS_NONE;
   const auto& [buffer, place] = work_->figurePlaces[candidate.figure];
   return figureWords_[buffer] + place * abi::FIGURE_WORDS;
 }
 std::uint32_t Encoder::paletteWord(const Candidate& candidate) const {
   const PalettePlace& palette = candidate.palette;
-  if (palette.index == notUsed) return 0;
+  if (palette.index == notUsed) return abi::CANDIDATE_NEEDS_NONE;
   return paletteWords_[palette.list()] + palette.index * abi::PALETTE_WORDS;
 }
 
