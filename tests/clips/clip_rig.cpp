@@ -200,7 +200,8 @@ double PackedRig::check(std::span<const ClipLayer> layers) const {
 double PackedRig::checkSkin(std::span<const ClipLayer> layers, std::uint32_t skin) const {
   const std::vector<JointMatrix> pose = sample(layers, skin);
   const Result<reference::SampledPose> expected =
-      reference::samplePose(skeleton, clips, maskSpans(), layers, skin, &*bank);
+      reference::samplePose(skeleton, clips, maskSpans(), layers, skin, &*bank,
+                            options.rootMotion ? &*options.rootMotion : nullptr);
   if (!expected) {
     ADD_FAILURE() << expected.error().message;
     return HUGE_VAL;

@@ -20,7 +20,7 @@ namespace dermis::test {
 namespace {
 
 /// Small, but with all that a bank may hold: masks, an additive clip, one that does not wrap, a
-/// constant track, a jump, and morph weights.
+/// constant track, a jump, morph weights, and root motion.
 PackedRig& smallRig() {
   static const std::unique_ptr<PackedRig> rig = [] {
     gltf::Model model = armRig();
@@ -44,6 +44,7 @@ PackedRig& smallRig() {
     made->masks = {Floats(arm::nodeCount, 0.5f), Floats(arm::nodeCount, 0)};
     made->masks[1][arm::hand] = 1;
     made->options.maxError = 1e-2;
+    made->options.rootMotion = {.node = arm::body, .upAxis = 1};
     if (!made->pack()) made->bank.reset();
     return made;
   }();
@@ -84,6 +85,7 @@ void samplePoses(const PackedClips& bank) {
     for (std::uint32_t clip = 0; clip < bank.clipCount(); ++clip) {
       const double duration = double{bank.clip(clip).duration};
       ASSERT_TRUE(duration >= 0 && std::isfinite(duration));
+      EXPECT_TRUE(rootMotion(bank, clip, 0.3 * duration, 2.6 * duration).ok());
       for (const double time : {0.0, 0.4 * duration, duration, 1.7 * duration, -1e30}) {
         const std::uint32_t mask = (clip + (time > 0 ? 1 : 0)) % (bank.maskCount() + 1);
         const std::array<ClipLayer, 3> layers{

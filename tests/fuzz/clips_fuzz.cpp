@@ -145,6 +145,9 @@ Result<PackedClips> packSource(Input& input) {
   options.masks = source.maskViews;
   if (input.below(2) == 0) options.maxError = double{input.number()};
   if (input.below(4) == 0) options.maxWeightError = double{input.number()};
+  if (input.below(3) == 0)
+    options.rootMotion = {.node = input.below(9),
+                          .upAxis = input.below(32) == 0 ? 3 : input.below(3)};
   PackClipsReport report;
   Result<PackedClips> packed = packClips(source.skeleton, source.clips, options, &report);
   if (!packed) return packed;
@@ -187,6 +190,7 @@ std::vector<std::uint32_t> makeGoodBank() {
   const std::array<std::span<const float>, 1> masks{factors};
   PackClipsOptions options;
   options.masks = masks;
+  options.rootMotion = {.node = 0, .upAxis = 1};
   const Result<PackedClips> packed = packClips(skeleton, clips, options);
   require(packed.ok());
   return fuzz::wordsOf(packed->bytes());
@@ -215,6 +219,8 @@ void sample(const PackedClips& bank, Input& input) {
     if (layer.time - layer.time != 0) continue;  // not finite
     const float time = clipTime(info, layer.time, layer.hold);
     require(time >= 0 && time <= info.duration);
+    const Result<RootMotion> motion = rootMotion(bank, layer.clip, 0, layer.time, layer.hold);
+    require(motion.ok() || !motion.error().message.empty());
   }
   for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
     // As long as it has to be: sanitizers see what is written behind it.

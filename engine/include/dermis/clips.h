@@ -90,6 +90,24 @@ struct ClipView {
   double baseTime = 0;                   ///< seconds, clamped, of `baseClip`
 };
 
+/// Which node carries a figure over the ground, and which direction is up.
+///
+/// The motion M(t) of a clip is a turn by h(t) about the up axis, followed by a shift p(t) over the
+/// ground, both in the space of the skeleton's roots. They follow from the global transform G(t) of
+/// the node:
+/// - The rotation of G(t) relative to that of G(0) is a tilt about an axis on the ground, followed
+///   by a turn about the up axis: by h(t). It is continuous, so it counts whole turns. While the
+///   node is tilted by 180 degrees there is no such turn.
+/// - p(t) = g(t) − g(0) turned by h(t), with g(t) the origin of the node, projected to the ground.
+///
+/// So M(0) is the identity. The packed clip has M(t)⁻¹ G(t): the node stays above one place, with
+/// its height and tilt. M(t) × the pose of the packed clip is the pose of the source, for the node
+/// and what is below it, within `PackClipsOptions::maxError`. Other nodes keep their animation.
+struct RootMotionOptions {
+  std::uint32_t node = 0;    ///< of the skeleton
+  std::uint32_t upAxis = 1;  ///< 0: x, 1: y, 2: z
+};
+
 /// How clips are packed.
 struct PackClipsOptions {
   /// How far a point that a joint moves may be from where the clips have it, in the units of the
@@ -105,6 +123,10 @@ struct PackClipsOptions {
   std::span<const std::span<const float>> masks = {};
   /// How far a morph weight may be from that of the clips. 0: 1/1000.
   double maxWeightError = 0;
+  /// If there is one, the motion of this node over the ground is taken out of all clips that are
+  /// not additive, and stored beside them (`dermis::rootMotion`). What additive clips add is the
+  /// same as without it.
+  std::optional<RootMotionOptions> rootMotion = {};
 };
 
 /// What `packClips` made.
@@ -163,8 +185,13 @@ class DERMIS_CORE_API PackedClips {
   ClipInfo clip(std::uint32_t clip) const;
   /// The number of morph weights of a node of the skeleton, as packed. 0 if there is none.
   std::uint32_t weightCount(std::uint32_t node) const;
-  /// The error of a node of the skeleton. 0 where no clip moves it, and if there is none.
+  /// The error of a node of the skeleton. 0 where no clip moves it, and if there is none. The
+  /// rotation of the node of `rootMotion` is measured in part.
   ClipError error(std::uint32_t node) const;
+  bool hasRootMotion() const;  ///< whether the clips were packed with `rootMotion`
+  /// The error of the motion of a clip from its beginning: of the node's place on the ground, and
+  /// of its heading. Measured in part.
+  ClipError rootMotionError() const;
 
  private:
   friend DERMIS_CORE_API Result<PackedClips> packClips(const Skeleton& skeleton,
@@ -194,7 +221,9 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 /// - `invalidArgument` if a number is not finite, an index or a size does not fit, parents form a
 ///   cycle, a rotation is 0, a node with a matrix is animated, two channels have one node and path,
 ///   times descend, weights of a node without any are animated, a clip is its own base or its base
-///   is additive, an option is out of range, or there are no skins, or one has no joints;
+///   is additive, an option is out of range, there are no skins, or one has no joints, or clips
+///   move a node above that of `rootMotion`, or the global transform at rest of its parent is not
+///   made of translation, rotation and uniform scale;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
 ///   `maxPoseJoints` joints, a number leaves the range of float32, or the error cannot be kept: the
 ///   message names the clip and the node.
@@ -248,6 +277,26 @@ DERMIS_CORE_API Result<void> samplePose(const PackedClips& bank, std::span<const
 DERMIS_CORE_API Result<void> sampleWeights(const PackedClips& bank,
                                            std::span<const ClipLayer> layers, std::uint32_t node,
                                            std::span<float> weights);
+
+/// A motion over the ground: of a figure, in its own frame before the motion.
+struct RootMotion {
+  std::array<double, 3> displacement{};  ///< its component along the up axis is 0
+  double turn = 0;                       ///< radians about the up axis
+};
+
+/// The motion that was taken out of a clip from one time to another: M(from)⁻¹ M(to), with the M of
+/// `RootMotionOptions`. An engine moves and turns its figure by it in each frame; with the global
+/// transform F of the figure, F <- F × translation(displacement) × rotation(turn).
+///
+/// If the clip wraps, times are not wrapped: each loop begins where the one before ended, and times
+/// may be negative. Otherwise, and with `hold`, they are clamped. `to` may be before `from`. Zero
+/// for additive clips, and for banks without root motion.
+///
+/// O(log loops). Any thread. In double precision, from keys in float32. Fails with
+/// `invalidArgument` if the clip does not exist, or a time is not finite or 2^52 loops away.
+DERMIS_CORE_API Result<RootMotion> rootMotion(const PackedClips& bank, std::uint32_t clip,
+                                              double fromSeconds, double toSeconds,
+                                              bool hold = false);
 
 // ---- Boxes for culling, computed once, for a mesh that clips move. docs/bounds.md has the proof.
 

@@ -90,7 +90,8 @@ struct SampledPose {
 /// float16, and the times to float32. A clip has the pose at rest where it has no channel; so has
 /// the base of an additive clip.
 ///
-/// `masks` are those of `PackClipsOptions`. The bounds follow from `bank->error`.
+/// `masks` are those of `PackClipsOptions`, and so is `rootMotion`, if there is one. The bounds
+/// follow from `bank->error`.
 ///
 /// Fails with `invalidArgument` as `dermis::samplePose` does, and if an index or a size does not
 /// fit, or parents form a cycle.
@@ -99,7 +100,26 @@ DERMIS_VERIFY_API Result<SampledPose> samplePose(const Skeleton& skeleton,
                                                  std::span<const std::span<const float>> masks,
                                                  std::span<const ClipLayer> layers,
                                                  std::uint32_t skin,
-                                                 const PackedClips* bank = nullptr);
+                                                 const PackedClips* bank = nullptr,
+                                                 const RootMotionOptions* rootMotion = nullptr);
+
+/// What `rootMotion` returns.
+struct SampledMotion {
+  RootMotion motion;
+  /// How far the motion of the bank may be from it; 0 if there was no bank.
+  double displacementBound = 0, turnBound = 0;
+};
+
+/// The motion that `packClips` takes out of a clip, for `dermis::rootMotion`. O(loops × keys).
+///
+/// Fails with `invalidArgument` as `dermis::rootMotion` and `packClips` do, and if the times are
+/// more than a million loops apart.
+DERMIS_VERIFY_API Result<SampledMotion> rootMotion(const Skeleton& skeleton,
+                                                   std::span<const ClipView> clips,
+                                                   const RootMotionOptions& options,
+                                                   std::uint32_t clip, double fromSeconds,
+                                                   double toSeconds, bool hold = false,
+                                                   const PackedClips* bank = nullptr);
 
 /// What `sampleWeights` returns.
 struct SampledWeights {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -148,6 +149,97 @@ Local differenceOf(const Local& local, const Local& base) {
   return result;
 }
 
+// ---- Root motion.
+
+template <typename Rows>  // of a Transform or a JointMatrix
+dmat4 toMatrix(const Rows& rows) {
+  dmat4 result(1.0);
+  for (glm::length_t row = 0; row < 3; ++row)
+    for (glm::length_t column = 0; column < 4; ++column)
+      result[column][row] =
+          double{rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]};
+  return result;
+}
+
+/// The node whose motion is taken out. Its parent stays at rest.
+struct Carrier {
+  const Skeleton& skeleton;
+  std::uint32_t node;
+  glm::length_t up;
+  dmat4 above{1.0};          ///< the global transform of the parent
+  dquat turned{1, 0, 0, 0};  ///< its rotation
+
+  Carrier(const Skeleton& of, const RootMotionOptions& options)
+      : skeleton(of), node(options.node), up(static_cast<glm::length_t>(options.upAxis)) {
+    std::uint32_t next = skeleton.nodes[node].parent;
+    for (; next < skeleton.nodes.size(); next = skeleton.nodes[next].parent)
+      above = restMatrix(skeleton.nodes[next]) * above;
+    turned =
+        glm::normalize(glm::quat_cast(dmat3(above) / std::cbrt(glm::determinant(dmat3(above)))));
+  }
+
+  static dmat4 restMatrix(const SkeletonNode& node) {
+    if (node.matrix) return toMatrix(*node.matrix);
+    const Local rest = restOf(node);
+    dmat4 matrix(glm::mat3_cast(rest.rotation));
+    for (glm::length_t i = 0; i < 3; ++i) matrix[i] *= rest.scale[i];
+    matrix[3] = {rest.translation, 1};
+    return matrix;
+  }
+
+  /// From −2π to 2π: the turn about the up axis of the rotation since the beginning.
+  double heading(const ClipView& clip, double time) const {
+    const dquat start = localAt(skeleton, node, clip, 0).rotation;
+    const dquat now = localAt(skeleton, node, clip, time).rotation;
+    const dquat since = turned * now * glm::conjugate(start) * glm::conjugate(turned);
+    const std::array<double, 3> axis{since.x, since.y, since.z};
+    return 2 * std::atan2(axis[static_cast<std::size_t>(up)], since.w);
+  }
+  /// The same, with whole turns: followed from the beginning.
+  double wholeHeading(const ClipView& clip, double time) const {
+    std::vector<double> times{0, time};
+    for (const ChannelView& channel : clip.channels) {
+      if (channel.node != node || channel.path != ChannelPath::rotation) continue;
+      for (const float key : channel.times)
+        if (double{key} > 0 && double{key} < time) times.push_back(double{key});
+    }
+    std::sort(times.begin(), times.end());
+    double whole = 0;
+    constexpr int steps = 24;
+    for (std::size_t i = 0; i + 1 < times.size(); ++i) {
+      for (int step = 1; step <= steps; ++step) {
+        const double at = times[i] + (times[i + 1] - times[i]) * step / steps;
+        const double next = heading(clip, at), turn = 2 * std::numbers::pi;
+        whole = next + turn * std::round((whole - next) / turn);
+      }
+    }
+    return whole;
+  }
+  dvec3 ground(const ClipView& clip, double time) const {
+    dvec3 place(above * dvec4(localAt(skeleton, node, clip, time).translation, 1));
+    place[up] = 0;
+    return place;
+  }
+  dmat4 motion(const ClipView& clip, double time) const {
+    dvec3 axis(0.0);
+    axis[up] = 1;
+    dmat4 result(glm::mat3_cast(glm::angleAxis(heading(clip, time), axis)));
+    result[3] = {ground(clip, time) - dmat3(result) * ground(clip, 0), 1};
+    return result;
+  }
+  /// What remains.
+  Local inPlace(const ClipView& clip, double time) const {
+    Local local = localAt(skeleton, node, clip, time);
+    const dmat4 taken = motion(clip, time);
+    local.translation =
+        dvec3(glm::inverse(above) * glm::inverse(taken) * above * dvec4(local.translation, 1));
+    local.rotation =
+        glm::normalize(glm::conjugate(turned) * glm::conjugate(glm::quat_cast(dmat3(taken))) *
+                       turned * local.rotation);
+    return local;
+  }
+};
+
 /// The time inside a clip, as `clipTime` has it.
 double timeInClip(const ClipView& clip, double seconds, bool hold) {
   const double duration = double{static_cast<float>(clip.duration)};
@@ -269,7 +361,7 @@ double turnOf(double angle, const dquat& sum, bool eitherHemisphere) {
 }
 
 Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer> layers,
-            const ClipError& clipError, LocalError& error) {
+            const ClipError& clipError, const Carrier* carrier, LocalError& error) {
   const double angle = double{clipError.rotation} + 16 * u;
   Local sum{dvec3(0.0), dquat(0, 0, 0, 0), dvec3(0.0)};
   dquat first(1, 0, 0, 0);
@@ -278,7 +370,9 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
   for (const Layer& layer : layers) {
     const double factor = layer.factor(node);
     if (layer.clip->additive || factor == 0) continue;
-    const Local local = localAt(skeleton, node, *layer.clip, layer.time);
+    const bool isCarrier = carrier != nullptr && carrier->node == node;
+    const Local local = isCarrier ? carrier->inPlace(*layer.clip, layer.time)
+                                  : localAt(skeleton, node, *layer.clip, layer.time);
     if (total == 0) first = local.rotation;
     const double cosine = glm::dot(first, local.rotation);
     eitherHemisphere |= std::abs(cosine) <= angle;
@@ -356,25 +450,15 @@ double normOf(const dmat4& matrix) {
   return singularValues(dmat3(matrix)).values[0];
 }
 
-template <typename Rows>  // of a Transform or a JointMatrix
-dmat4 toMatrix(const Rows& rows) {
-  dmat4 result(1.0);
-  for (glm::length_t row = 0; row < 3; ++row)
-    for (glm::length_t column = 0; column < 4; ++column)
-      result[column][row] =
-          double{rows[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]};
-  return result;
-}
-
 PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer> layers,
-                   const PosedNode& above, const PackedClips* bank) {
+                   const PosedNode& above, const PackedClips* bank, const Carrier* carrier) {
   PosedNode posed;
   if (skeleton.nodes[node].matrix) {
     posed.local = toMatrix(*skeleton.nodes[node].matrix);
   } else {
     const ClipError clipError = bank != nullptr ? bank->error(node) : ClipError{};
     LocalError error;
-    Local local = blend(skeleton, node, layers, clipError, error);
+    Local local = blend(skeleton, node, layers, clipError, carrier, error);
     for (const Layer& layer : layers) add(skeleton, node, layer, clipError, local, error);
     posed.local = dmat4(glm::mat3_cast(local.rotation));
     for (glm::length_t i = 0; i < 3; ++i) posed.local[i] *= local.scale[i];
@@ -441,7 +525,7 @@ Result<std::vector<Layer>> toLayers(const Skeleton& skeleton, std::span<const Cl
 Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
                                std::span<const std::span<const float>> masks,
                                std::span<const ClipLayer> layers, std::uint32_t skin,
-                               const PackedClips* bank) {
+                               const PackedClips* bank, const RootMotionOptions* rootMotion) {
   if (const Result<void> checked = checkSkin(skeleton, skin); !checked) return checked.error();
   const Result<std::vector<Layer>> resolved = toLayers(skeleton, clips, masks, layers);
   if (!resolved) return resolved.error();
@@ -451,10 +535,14 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
   const std::vector<std::uint32_t> order = diagnosis::orderOf(parents);
   if (order.size() != parents.size()) return refused("the parents of nodes form a cycle");
 
+  if (rootMotion != nullptr && (rootMotion->node >= parents.size() || rootMotion->upAxis > 2))
+    return refused("root motion names a node or an axis that does not exist");
+  std::optional<Carrier> carrier;
+  if (rootMotion != nullptr) carrier.emplace(skeleton, *rootMotion);
   std::vector<PosedNode> nodes(parents.size());
   for (const std::uint32_t node : order) {
     const PosedNode above = parents[node] != noJoint ? nodes[parents[node]] : PosedNode();
-    nodes[node] = poseNode(skeleton, node, *resolved, above, bank);
+    nodes[node] = poseNode(skeleton, node, *resolved, above, bank, carrier ? &*carrier : nullptr);
   }
   SampledPose pose;
   const SkeletonSkin& posedSkin = skeleton.skins[skin];
@@ -470,6 +558,55 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
     if (bank != nullptr) pose.bounds.push_back(boundOf(nodes, parents, joint, inverseBind));
   }
   return pose;
+}
+
+// The bank has M(t) as a place on the ground and a heading, which are off by the distance e and the
+// angle a of `rootMotionError`. So the shift of M is off by e + a |g(0)|, and a product of n such
+// motions by n times that, and n + 1 times a for the shift of each.
+Result<SampledMotion> rootMotion(const Skeleton& skeleton, std::span<const ClipView> clips,
+                                 const RootMotionOptions& options, std::uint32_t clip,
+                                 double fromSeconds, double toSeconds, bool hold,
+                                 const PackedClips* bank) {
+  if (const Result<void> checked = checkClips(skeleton, clips); !checked) return checked.error();
+  if (options.node >= skeleton.nodes.size() || options.upAxis > 2)
+    return refused("root motion names a node or an axis that does not exist");
+  if (clip >= clips.size()) return refused("clip " + std::to_string(clip) + " does not exist");
+  if (!std::isfinite(fromSeconds) || !std::isfinite(toSeconds))
+    return refused("a time is not finite");
+  SampledMotion result;
+  const ClipView& played = clips[clip];
+  if (played.additive) return result;
+  const Carrier carrier(skeleton, options);
+  const double duration = double{static_cast<float>(played.duration)};
+  const bool wraps = played.wraps && !hold && duration > 0;
+  const auto loopOf = [&](double seconds) { return wraps ? std::floor(seconds / duration) : 0; };
+  const auto timeOf = [&](double seconds) {
+    return std::clamp(seconds - loopOf(seconds) * duration, 0.0, duration);
+  };
+  const double loops = loopOf(toSeconds) - loopOf(fromSeconds);
+  if (!(std::abs(loops) <= 1e6)) return refused("the times are too far apart");
+
+  const double from = timeOf(fromSeconds), to = timeOf(toSeconds);
+  dmat4 all = glm::inverse(carrier.motion(played, from));
+  const dmat4 loop = carrier.motion(played, duration);
+  for (double i = 0; i < std::abs(loops); ++i) all = all * (loops > 0 ? loop : glm::inverse(loop));
+  all = all * carrier.motion(played, to);
+  for (glm::length_t i = 0; i < 3; ++i)
+    result.motion.displacement[static_cast<std::size_t>(i)] = i == carrier.up ? 0 : all[3][i];
+  result.motion.turn = carrier.wholeHeading(played, to) - carrier.wholeHeading(played, from) +
+                       loops * carrier.wholeHeading(played, duration);
+  if (bank == nullptr) return result;
+  const ClipError error = bank->rootMotionError();
+  const double count = std::abs(loops) + 2, angle = double{error.rotation};
+  double shifts = 0;
+  for (const double time : {from, to})
+    shifts += glm::length(dvec3(carrier.motion(played, time)[3]));
+  shifts += std::abs(loops) * glm::length(dvec3(loop[3]));
+  result.turnBound = count * angle + 1e-12;
+  result.displacementBound =
+      count * (double{error.translation} + angle * glm::length(carrier.ground(played, 0))) +
+      (count + 1) * angle * shifts + 1e-12;
+  return result;
 }
 
 // The bank's weights are off by the `ClipError` e of the node, so their mean is, too. float32: as

@@ -29,8 +29,8 @@ class BankCheck {
         !isSection(header.clips, header.clipCount * std::uint64_t{sizeof(BankClip) / 4}) ||
         !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
         !isSection(header.morphed, header.morphedCount * std::uint64_t{sizeof(BankMorphed) / 4}) ||
-        header.clipCount > maxClips || header.maskCount > maxMasks || header.nodes % 4 != 0 ||
-        header.clips % 4 != 0)
+        (header.motion != 0 && !isMotion(header.motion)) || header.clipCount > maxClips ||
+        header.maskCount > maxMasks || header.nodes % 4 != 0 || header.clips % 4 != 0)
       return damagedBank("its header does not fit its sections");
     for (std::size_t i = 0; i < nodes; ++i) {
       if (!isNode(i)) return damagedBank("node " + std::to_string(i) + " is not valid");
@@ -86,6 +86,12 @@ class BankCheck {
            std::isfinite(node.error);
   }
 
+  bool isMotion(std::uint32_t offset) const {
+    if (!areFinite(std::uint64_t{offset} + 1, 3)) return false;
+    const auto motion = bank_.at<BankMotion>(offset);
+    return motion.upAxis < 3 && motion.length > 0;
+  }
+
   bool isClass(const BankClass& keys) const {
     const KeyFormat format = KeyFormat::of(keys.format);
     const std::uint64_t columns = keys.columnCount, intervals = std::uint64_t{keys.keyCount} - 1;
@@ -116,7 +122,7 @@ class BankCheck {
 
   bool isClip(const BankClip& clip) const {
     const std::uint64_t ofNodes = std::uint64_t{3} * bank_.header.nodeCount;
-    const std::uint64_t tracks = ofNodes + bank_.header.groupCount;
+    const std::uint64_t tracks = bank_.trackCount();
     if (!std::isfinite(clip.duration) || clip.duration < 0 || !std::isfinite(clip.rate) ||
         clip.rate < 0 || clip.flags > 3 || clip.classCount > 256 ||
         !std::isfinite(clip.duration * clip.rate) || clip.classes % 4 != 0 ||
@@ -196,6 +202,17 @@ std::uint32_t PackedClips::weightCount(std::uint32_t node) const {
   const ClipBank bank(*this);
   const std::optional<BankMorphed> found = bank.morphedNode(node);
   return found ? found->count : 0;
+}
+
+bool PackedClips::hasRootMotion() const {
+  return ClipBank(*this).header.motion != 0;
+}
+
+ClipError PackedClips::rootMotionError() const {
+  const ClipBank bank(*this);
+  if (bank.header.motion == 0) return {};
+  const auto motion = bank.at<BankMotion>(bank.header.motion);
+  return {motion.translationError, motion.rotationError};
 }
 
 ClipError PackedClips::error(std::uint32_t node) const {

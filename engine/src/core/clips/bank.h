@@ -27,7 +27,7 @@ struct BankHeader {
   std::uint32_t nodes, skins, clips, masks;  ///< `masks`: `nodeCount` factors for each
   std::uint32_t morphedCount, morphed;       ///< nodes with morph weights
   std::uint32_t groupCount;                  ///< groups of three weights, of all these nodes
-  std::uint32_t unused;
+  std::uint32_t motion;                      ///< a `BankMotion`; 0: there is no root motion
 };
 
 /// A node that clips move. Parents come before their children.
@@ -54,6 +54,13 @@ struct BankMorphed {
   std::uint32_t groupCount() const { return count / 3 + (count % 3 != 0 ? 1 : 0); }
 };
 
+/// Root motion. In a clip its track is the last one. Its values are those of `motionBetween`.
+struct BankMotion {
+  std::uint32_t upAxis;
+  float length;  ///< by which headings are multiplied
+  float translationError, rotationError;
+};
+
 struct BankSkin {
   std::uint32_t jointCount;
   std::uint32_t nodes;     ///< for each joint the node that moves it, or `noNode`
@@ -67,7 +74,7 @@ struct BankClip {
   std::uint32_t classCount;
   std::uint32_t classes;
   std::uint32_t tracks;  ///< for each node three words: translation, rotation, scale; then for
-                         ///< each group of weights one
+                         ///< each group of weights one, and one for the root motion if any
   std::uint32_t unused[2];
 };
 
@@ -208,6 +215,10 @@ struct ClipBank {
     }
     return std::nullopt;
   }
+  /// In a clip.
+  std::size_t trackCount() const {
+    return std::size_t{3} * header.nodeCount + header.groupCount + (header.motion != 0 ? 1 : 0);
+  }
   BankClip clip(std::size_t i) const { return at<BankClip>(header.clips + i * wordsOf<BankClip>); }
   BankClass keyClass(const BankClip& clip, std::size_t i) const {
     return at<BankClass>(clip.classes + i * wordsOf<BankClass>);
@@ -243,7 +254,8 @@ static_assert(offsetof(BankHeader, nodes) == abi::CLIPS_OFFSETS * 4 &&
               sizeof(BankClass) == abi::CLIP_CLASS_WORDS * 4 &&
               trackColumnBits == abi::TRACK_COLUMN_BITS);
 static_assert(sizeof(BankHeader) == 64 && sizeof(BankNode) == 64 && sizeof(BankSkin) == 16 &&
-              sizeof(BankMorphed) == 32 && sizeof(BankClip) == 32 && sizeof(BankClass) == 32);
+              sizeof(BankMorphed) == 32 && sizeof(BankMotion) == 16 && sizeof(BankClip) == 32 &&
+              sizeof(BankClass) == 32);
 
 /// Checks the length, the version, the checksum, every offset and index, and that numbers are
 /// finite. O(words).

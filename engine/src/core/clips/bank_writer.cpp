@@ -44,6 +44,10 @@ class BankWriter {
       writeNode(header.nodes + 16 * i, parts_.moved[i]);
     for (std::size_t i = 0; i < parts_.skeleton.skins.size(); ++i)
       writeSkin(header.skins + 4 * i, parts_.skeleton.skins[i]);
+    if (parts_.motion) {
+      header.motion = reserve(sizeof(BankMotion) / 4);
+      put(header.motion, *parts_.motion);
+    }
     for (std::size_t i = 0; i < parts_.morphed.size(); ++i) {
       writeMorphed(header.morphed + 8 * i, parts_.morphed[i]);
       header.groupCount += static_cast<std::uint32_t>(parts_.morphed[i].rest.size());
@@ -134,7 +138,7 @@ class BankWriter {
     for (const std::array<Track, 3>& ofNode : clip.tracks) {
       for (const Track& track : ofNode) tracks.push_back(&track);
     }
-    for (const Track& track : clip.weightTracks) tracks.push_back(&track);
+    for (const Track& track : clip.vectorTracks) tracks.push_back(&track);
     int finest = 20;
     for (const Track* track : tracks) {
       if (track->kind == TrackKind::animated) finest = std::min(finest, track->level);

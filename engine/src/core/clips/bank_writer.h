@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -46,7 +47,7 @@ struct Hanging {
 struct FittedClip {
   double rate = 1;
   std::vector<std::array<Track, 3>> tracks;  ///< of each node
-  std::vector<Track> weightTracks;           ///< of each group of weights
+  std::vector<Track> vectorTracks;  ///< of each group of weights, then of the root motion if any
 };
 
 struct BankParts {
@@ -57,6 +58,7 @@ struct BankParts {
   std::span<const MorphedNode> morphed;
   std::span<const Hanging> hanging;  ///< of each node of the skeleton
   std::span<const FittedClip> fitted;
+  std::optional<BankMotion> motion;
 };
 
 /// The words of a bank. Counts them, the tracks and the keys.

@@ -171,6 +171,9 @@ Result<void> checkClipInput(const Skeleton& skeleton, std::span<const ClipView> 
     return invalid("maxError is not finite, or negative");
   if (!std::isfinite(options.maxWeightError) || options.maxWeightError < 0)
     return invalid("maxWeightError is not finite, or negative");
+  if (options.rootMotion &&
+      (options.rootMotion->node >= skeleton.nodes.size() || options.rootMotion->upAxis > 2))
+    return invalid("rootMotion names a node or an axis that does not exist");
   if (Result<void> good = checkNodes(skeleton.nodes); !good) return good;
   if (Result<void> good = checkSkins(skeleton); !good) return good;
   if (!options.meshes.empty() && options.meshes.size() != skeleton.skins.size()) {

@@ -14,6 +14,7 @@
 #include "clips/bank_writer.h"
 #include "clips/check.h"
 #include "clips/curve.h"
+#include "clips/root_motion.h"
 #include "clips/track.h"
 #include "dermis/clips.h"
 #include "strict_floating_point.h"
@@ -68,6 +69,13 @@ Local restOf(const SkeletonNode& node) {
   return {{{t[0], t[1], t[2], 0}, normalized(node.rotation), {s[0], s[1], s[2], 0}}};
 }
 
+/// What decides how exact a node must be in a clip, at most at any time.
+struct Needs {
+  double above = 1e-30;       ///< the scale of what is above it
+  double reach = 1e-30;       ///< the distance of what hangs on it
+  double localReach = 1e-30;  ///< the same in its own units
+};
+
 class Packer {
  public:
   Packer(const Skeleton& skeleton, std::span<const ClipView> clips, const PackClipsOptions& options)
@@ -77,6 +85,7 @@ class Packer {
     findChannels();
     findMovedNodes();
     findMorphedNodes();
+    if (Result<void> good = findRootMotion(); !good) return good.error();
     measureReach();
     report.maxError = maxError_;
     for (std::size_t i = 0; i < clips_.size(); ++i) {
@@ -84,8 +93,8 @@ class Packer {
       if (!packed) return packed.error();
       packed_.push_back(*std::move(packed));
     }
-    return writeBank({skeleton_, clips_, options_.masks, moved_, morphed_, hanging_, packed_},
-                     report);
+    return writeBank(
+        {skeleton_, clips_, options_.masks, moved_, morphed_, hanging_, packed_, motion_}, report);
   }
 
  private:
@@ -164,6 +173,39 @@ class Packer {
     }
   }
 
+  /// What splits the motion of the node, and which nodes it carries.
+  Result<void> findRootMotion() {
+    if (!options_.rootMotion) return {};
+    const std::uint32_t node = options_.rootMotion->node;
+    const std::uint32_t parent = skeleton_.nodes[node].parent;
+    const bool isRoot = parent >= skeleton_.nodes.size();
+    const auto refused = [&](const std::string& what) {
+      return Error{
+          ErrorCode::invalidArgument,
+          "packClips: rootMotion: " + titled("node", node, skeleton_.nodes[node].name) + what};
+    };
+    if (!isRoot && hanging_[parent].node != noNode) {
+      const std::uint32_t above = moved_[hanging_[parent].node].source;
+      return refused(" is below " + titled("node", above, skeleton_.nodes[above].name) +
+                     ", which clips move");
+    }
+    frame_ = MotionFrame::of(isRoot ? identity : restGlobals_[parent], options_.rootMotion->upAxis);
+    if (!frame_) {
+      return refused(
+          " has a parent whose global transform is not made of translation, rotation and uniform "
+          "scale");
+    }
+    motion_ = BankMotion{options_.rootMotion->upAxis, 1, 0, 0};
+    const std::uint32_t carrier = hanging_[node].node;
+    isCarried_.resize(moved_.size());
+    for (std::size_t i = 0; i < moved_.size(); ++i) {
+      const MovedNode& moved = moved_[i];
+      isCarried_[i] = moved.source == node || (moved.parent != noNode && isCarried_[moved.parent]);
+    }
+    if (carrier != noNode && moved_[carrier].source == node) carrier_ = carrier;
+    return {};
+  }
+
   /// Lets a moved node reach a point of the rest pose.
   void reach(std::uint32_t node, const Point& point) {
     if (node != noNode)
@@ -232,6 +274,7 @@ class Packer {
       if (node.reach == 0) node.reach = extent;
     }
     maxError_ = options_.maxError > 0 ? options_.maxError : extent / 10000;
+    if (carrier_ != noNode) motion_->length = static_cast<float>(moved_[carrier_].reach + extent);
   }
 
   /// The rate at which all keys of a clip are, or else one that suits them.
@@ -298,6 +341,38 @@ class Packer {
     return channel;
   }
 
+  /// Straight lines between keys of what is split get little of the error.
+  SplitMotion splitMotionOf(std::size_t number, double duration, const Needs& needs) const {
+    const MovedNode& node = moved_[carrier_];
+    return splitMotion(*frame_, channelOf(number, node.source, ChannelPath::translation),
+                       channelOf(number, node.source, ChannelPath::rotation), node.rest[0],
+                       node.rest[1], duration, double{motion_->length}, maxError_ / 64,
+                       maxError_ / (64 * needs.reach));
+  }
+
+  /// Packs morph weights and the root motion.
+  Result<void> packVectors(std::size_t number, double duration, const SplitMotion* split,
+                           std::span<const Needs> needs, FittedClip& packed) {
+    if (Result<void> good = packWeights(number, duration, packed); !good) return good;
+    if (!motion_) return {};
+    packed.vectorTracks.emplace_back();
+    if (split == nullptr) return {};
+    const Curve curve(&split->motion, ChannelPath::translation, {}, {});
+    const double tolerance =
+        maxError_ / (8 * std::max(1.0, needs[carrier_].reach / double{motion_->length}));
+    std::optional<Track> track = fitTrack(curve, Value{}, duration, packed.rate, tolerance);
+    if (!track)
+      return unkept(where(number, options_.rootMotion->node), "maxError", maxError_, packed.rate);
+    // Both the place and the heading are relative to those at the beginning.
+    const double error = 2 * (track->error + split->motionError) * (1 + 0x1p-23);
+    motion_->translationError = std::max(motion_->translationError, static_cast<float>(error));
+    motion_->rotationError =
+        std::max(motion_->rotationError,
+                 static_cast<float>(error / double{motion_->length} * (1 + 0x1p-23)));
+    packed.vectorTracks.back() = *std::move(track);
+    return {};
+  }
+
   Result<void> packWeights(std::size_t number, double duration, FittedClip& packed) {
     const ClipView& clip = clips_[number];
     const double tolerance = options_.maxWeightError > 0 ? options_.maxWeightError : 1e-3;
@@ -320,7 +395,7 @@ class Packer {
         if (!track)
           return unkept(where(number, node.source), "maxWeightError", tolerance, packed.rate);
         node.error = std::max(node.error, static_cast<float>(track->error * (1 + 0x1p-23)));
-        packed.weightTracks.push_back(*std::move(track));
+        packed.vectorTracks.push_back(*std::move(track));
       }
     }
     return {};
@@ -339,8 +414,19 @@ class Packer {
     FittedClip packed;
     const double duration = double{static_cast<float>(clips_[number].duration)};
     packed.rate = double{static_cast<float>(rateOf(clips_[number]))};
-    const std::vector<std::array<Curve, 3>> curves = curvesOf(number);
-    const std::vector<Needs> needs = needsOf(number, curves, duration);
+    const std::vector<std::array<Curve, 3>> source = curvesOf(number);
+    const std::vector<Needs> needs = needsOf(number, source, duration);
+    std::vector<std::array<Curve, 3>> curves = source;
+    std::optional<SplitMotion> split;
+    if (carrier_ != noNode && !clips_[number].additive) {
+      split = splitMotionOf(number, duration, needs[carrier_]);
+      if (split->place)
+        curves[carrier_][0] = Curve(&*split->place, ChannelPath::translation, {}, {});
+      if (split->turn) curves[carrier_][1] = Curve(&*split->turn, ChannelPath::rotation, {}, {});
+    }
+    if (Result<void> good = packVectors(number, duration, split ? &*split : nullptr, needs, packed);
+        !good)
+      return good.error();
     // Errors of joints add up along a chain. The share of each is made smaller until the sum fits.
     double share = 1, worst = 0;
     std::size_t worstNode = 0;
@@ -360,7 +446,7 @@ class Packer {
           packed.tracks[i][p] = *std::move(track);
         }
       }
-      worst = errorOf(number, packed, curves, duration, worstNode, worstTime);
+      worst = errorOf(number, packed, source, duration, split.has_value(), worstNode, worstTime);
       if (worst <= maxError_) break;
     }
     if (!(worst <= maxError_))
@@ -369,7 +455,8 @@ class Packer {
       float* const errors[] = {&moved_[i].error.translation, &moved_[i].error.rotation,
                                &moved_[i].error.scale};
       for (std::size_t p = 0; p < 3; ++p) {
-        const double error = packed.tracks[i][p].error * (1 + 0x1p-23);
+        double error = packed.tracks[i][p].error * (1 + 0x1p-23);
+        if (split && i == carrier_ && p == 1) error += split->turnError;
         *errors[p] = std::max(*errors[p], static_cast<float>(error));
       }
     }
@@ -377,7 +464,6 @@ class Packer {
       report.worstError = worst;
       report.worst = where(number, moved_[worstNode].source) + ", at " + decimal(worstTime) + " s";
     }
-    if (Result<void> good = packWeights(number, duration, packed); !good) return good.error();
     return packed;
   }
 
@@ -402,13 +488,6 @@ class Packer {
     }
     return globals;
   }
-
-  /// What decides how exact a node must be in a clip, at most at any time.
-  struct Needs {
-    double above = 1e-30;       ///< the scale of what is above it
-    double reach = 1e-30;       ///< the distance of what hangs on it
-    double localReach = 1e-30;  ///< the same in its own units
-  };
 
   std::vector<Needs> needsOf(std::size_t number, const std::vector<std::array<Curve, 3>>& curves,
                              double duration) const {
@@ -436,6 +515,12 @@ class Packer {
     return needs;
   }
 
+  std::size_t morphGroups() const {
+    std::size_t groups = 0;
+    for (const MorphedNode& node : morphed_) groups += node.rest.size();
+    return groups;
+  }
+
   /// From when to when a jump may be rounded, ascending and apart from each other.
   std::vector<std::pair<double, double>> nearJumps(const FittedClip& packed,
                                                    const std::vector<std::array<Curve, 3>>& curves,
@@ -451,6 +536,15 @@ class Packer {
           all.emplace_back(time - clearance, time + clearance);
       }
     }
+    for (std::size_t i = morphGroups(); i < packed.vectorTracks.size(); ++i) {
+      const Track& track = packed.vectorTracks[i];
+      const double interval = std::ldexp(1, track.level) / packed.rate;
+      for (std::size_t k = 0; k < track.jumps.size(); ++k) {
+        if (track.jumps[k] == 0) continue;
+        const double time = (static_cast<double>(k) + (track.jumps[k] + 1) / 256.0) * interval;
+        all.emplace_back(time - jumpClearance * interval, time + jumpClearance * interval);
+      }
+    }
     std::ranges::sort(all);
     for (const auto& [from, to] : all) {
       if (merged.empty() || from > merged.back().second) merged.emplace_back(from, to);
@@ -459,9 +553,18 @@ class Packer {
     return merged;
   }
 
-  /// The largest distance between a point that a joint moves and where the clip has it.
+  /// The motion of a packed clip from its beginning to a time.
+  Transform motionAt(const FittedClip& packed, double time) const {
+    const auto at = [&](double seconds) {
+      return packed.vectorTracks.back().at(seconds, packed.rate, {}, false);
+    };
+    return motionMatrix(motionBetween(at(0), at(time), double{motion_->length}), motion_->upAxis);
+  }
+
+  /// The largest distance between a point that a joint moves and where the clip has it. `isSplit`:
+  /// the motion was taken out.
   double errorOf(std::size_t number, const FittedClip& packed,
-                 const std::vector<std::array<Curve, 3>>& curves, double duration,
+                 const std::vector<std::array<Curve, 3>>& curves, double duration, bool isSplit,
                  std::size_t& worstNode, double& worstTime) const {
     const std::vector<std::pair<double, double>> skipped = nearJumps(packed, curves, duration);
     auto next = skipped.begin();
@@ -473,9 +576,15 @@ class Packer {
       if (next != skipped.end() && next->first <= time) continue;
       const std::vector<Transform> exact =
           globalsOf(number, [&](std::size_t i, std::size_t p) { return curves[i][p].at(time); });
-      const std::vector<Transform> stored = globalsOf(number, [&](std::size_t i, std::size_t p) {
+      std::vector<Transform> stored = globalsOf(number, [&](std::size_t i, std::size_t p) {
         return packed.tracks[i][p].at(time, packed.rate, stillOf(number, i)[p], p == 1);
       });
+      if (isSplit) {
+        const Transform motion = motionAt(packed, time);
+        for (std::size_t i = 0; i < moved_.size(); ++i) {
+          if (isCarried_[i]) stored[i] = multiply(motion, stored[i]);
+        }
+      }
       for (std::size_t i = 0; i < moved_.size(); ++i) {
         const MovedNode& node = moved_[i];
         const double distance = node.reach / std::max(scaleOf(node.global), 1e-30);
@@ -501,6 +610,10 @@ class Packer {
   std::deque<std::vector<float>> changedKeys_;  ///< which channels point to
   std::vector<MovedNode> moved_;
   std::vector<MorphedNode> morphed_;
+  std::optional<MotionFrame> frame_;
+  std::optional<BankMotion> motion_;
+  std::uint32_t carrier_ = noNode;      ///< the node with root motion in `moved_`
+  std::vector<bool> isCarried_;         ///< of each moved node, whether it is that or below it
   std::vector<Hanging> hanging_;        ///< of each node of the skeleton
   std::vector<Transform> restGlobals_;  ///< of each node of the skeleton
   double maxError_ = 0;

@@ -281,6 +281,11 @@ void poseSkin(const PackedClips& clips, std::uint32_t number,
   }
 }
 
+std::array<float, 4> sampleVector(const ClipBank& bank, const BankClip& clip, std::size_t track,
+                                  float time) {
+  return sampleTrack(bank, {clip, time, 1, 0}, track, false, {});
+}
+
 void sampleWeights(const PackedClips& clips, const PackedLayers& packed, const BankMorphed& node,
                    std::span<float> weights) {
   const ClipBank bank(clips);

@@ -47,6 +47,10 @@ DERMIS_CORE_API void sampleNodes(const PackedClips& clips, const PackedLayers& l
 DERMIS_CORE_API void sampleWeights(const PackedClips& clips, const PackedLayers& layers,
                                    const BankMorphed& node, std::span<float> weights);
 
+/// Samples a track of three numbers, which are 0 at rest. `track`: its place in those of the clip.
+std::array<float, 4> sampleVector(const ClipBank& bank, const BankClip& clip, std::size_t track,
+                                  float time);
+
 /// Computes the pose of a skin from the transforms of the nodes.
 DERMIS_CORE_API void poseSkin(const PackedClips& clips, std::uint32_t skin,
                               std::span<const Affine<float>> globals, std::span<JointMatrix> pose);
