@@ -195,6 +195,55 @@ TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
   }
 }
 
+TEST_F(CClipsTest, RootMotionIsThatOfCpp) {
+  const std::array<float, 2> times{0, 2};
+  const std::array<float, 6> values{0, 1, 2, 3, 4, 6};
+  dermis_channel channel = sized<dermis_channel>();
+  channel.times = times.data();
+  channel.values = values.data();
+  channel.key_count = 2;
+  channel.value_count = 6;
+  channel.interpolation = DERMIS_INTERPOLATION_LINEAR;
+  dermis_clip_view clip = sized<dermis_clip_view>();
+  clip.duration = 2;
+  clip.channels = &channel;
+  clip.channel_count = 1;
+  source.clips = &clip;
+  source.clip_count = 1;
+  while (channel.node + 1 < source.node_count && source.nodes[channel.node].parent != 0)
+    ++channel.node;
+  ASSERT_EQ(source.nodes[channel.node].parent, 0u);
+  clips.resize(1);
+  clips[0] = {.duration = 2, .channels = {}};
+  clips[0].channels = {{.node = channel.node, .times = times, .values = values}};
+  for (std::uint32_t up = 0; up < 4; ++up) {
+    source.root_motion_node = channel.node + 1;
+    source.up_axis = up;
+    Owned<dermis_bank> bank;
+    const PackedClips same = pack(
+        bank,
+        {.rootMotion = RootMotionOptions{.node = channel.node, .upAxis = up == 0 ? 1 : up - 1}});
+    dermis_bank_info info = sized<dermis_bank_info>();
+    expectOk(dermis_bank_contents(bank, &info, &error));
+    EXPECT_EQ(info.has_root_motion, 1u);
+    for (const bool hold : {false, true}) {
+      std::array<double, 3> displacement{};
+      double turn = -1;
+      expectOk(dermis_root_motion(bank, 0, 1, 5, hold ? 1 : 0, displacement.data(), &turn, &error));
+      const RootMotion motion = must(rootMotion(same, 0, 1, 5, hold));
+      EXPECT_EQ(displacement, motion.displacement);
+      EXPECT_EQ(turn, motion.turn);
+      EXPECT_NEAR(displacement[2], up == 3 ? 0 : hold ? 2 : 8, 0.01);
+    }
+    double turn = 0;
+    expectError(dermis_root_motion(bank, 1, 0, 1, 0, &turn, &turn, &error), "there is no clip 1");
+    expectError(dermis_root_motion(bank, 0, 0, 1, 0, nullptr, &turn, &error),
+                "displacement is null");
+  }
+  source.up_axis = 4;
+  expectRefused("rootMotion names a node or an axis that does not exist");
+}
+
 TEST_F(CClipsTest, ZerosAreTheDefaultsOfANode) {
   const double matrix[12] = {1, 0, 0, 0.5, 0, 2, 0, 0, 0, 0, 1, 0};
   std::array<dermis_node, 3> nodes{sized<dermis_node>(), sized<dermis_node>(),

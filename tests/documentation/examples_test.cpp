@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -143,6 +144,40 @@ Result<void> animate(const PackedClips& bank, double seconds, float speed,
   return samplePose(bank, layers, skin, pose);
 }
 // [/clips]
+
+// [clips-root-motion]
+/// Each frame: moves a figure, which is turned by `heading`, by what its clip walked.
+void walk(const RootMotion& step, std::array<double, 3>& place, double& heading) {
+  const auto& [x, y, z] = step.displacement;
+  place[0] += std::cos(heading) * x + std::sin(heading) * z;
+  place[2] += std::cos(heading) * z - std::sin(heading) * x;
+  heading += step.turn;  // radians about the y axis
+}
+// [/clips-root-motion]
+
+TEST(DocumentedExampleTest, AFigureWalksByItsRootMotion) {
+  Skeleton skeleton;
+  skeleton.nodes.resize(1);
+  constexpr std::array<std::uint32_t, 1> joints{0};
+  constexpr std::array<JointMatrix, 1> inverseBind{};
+  skeleton.skins = {{"one", joints, inverseBind}};
+  constexpr std::array<float, 2> times{0, 1};
+  constexpr std::array<float, 6> places{0, 1, 0, 0, 1, 2};
+  constexpr std::array<float, 8> turns{0, 0, 0, 1, 0, 0.70710678f, 0, 0.70710678f};
+  ClipView clip{.name = "walk", .duration = 1, .channels = {}};
+  clip.channels = {{.path = ChannelPath::translation, .times = times, .values = places},
+                   {.path = ChannelPath::rotation, .times = times, .values = turns}};
+  const RootMotionOptions options{.node = 0, .upAxis = 1};
+  const PackedClips bank = must(packClips(skeleton, {&clip, 1}, {.rootMotion = options}));
+  std::array<double, 3> place{};
+  double heading = 0;
+  for (int frame = 0; frame < 40; ++frame)
+    walk(must(rootMotion(bank, 0, frame * 0.05, (frame + 1) * 0.05)), place, heading);
+  // 2 along z in the first second, and along what was z in the second one, which is x then.
+  EXPECT_NEAR(place[0], 2, 0.02);
+  EXPECT_NEAR(place[2], 2, 0.02);
+  EXPECT_NEAR(heading, 3.14159265, 0.01);
+}
 
 // [clips-scene]
 /// Loading: a figure that plays clips. `clips` is what `addClips` returned for its bank.

@@ -1069,6 +1069,9 @@ typedef struct dermis_clips_source {
   double max_error;
   const dermis_mesh_view* meshes;  // of each skin: how far it reaches; null: as far as its joints
   double max_weight_error;         // how far a morph weight may be from the clips'; 0: 1/1000
+  // Takes the motion of a node over the ground out of the clips: 1 + its index; 0: of none.
+  uint32_t root_motion_node;
+  uint32_t up_axis;  // of the ground: 1: x, 2: y, 3: z; 0: y
 } dermis_clips_source;
 // Lists the skeleton and the clips of a model, as a source that the caller may change. It is valid
 // as long as the model.
@@ -1100,6 +1103,7 @@ typedef struct dermis_bank_info {
   const dermis_clip_info* clips;  // of each clip
   double worst_error;             // of the poses; 0 if the bank was loaded from bytes
   const char* worst;              // where: clip, node and time
+  uint32_t has_root_motion;       // whether it was taken out of the clips
 } dermis_bank_info;
 // Says what is known of a bank.
 DERMIS_C_API dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info,
@@ -1124,6 +1128,12 @@ DERMIS_C_API dermis_code dermis_sample_weights(const dermis_bank* bank,
                                                const dermis_clip_layer* layers,
                                                uint32_t layer_count, uint32_t node, float* weights,
                                                uint32_t weight_count, dermis_error* error);
+// Gets the motion over the ground that was taken out of a clip, between two times: how far a figure
+// moves, in its frame at the first one, and how far it turns about the up axis, in radians. Each
+// loop begins where the one before ended. `hold`: times are clamped, although the clip wraps.
+DERMIS_C_API dermis_code dermis_root_motion(const dermis_bank* bank, uint32_t clip, double from,
+                                            double to, uint32_t hold, double displacement[3],
+                                            double* turn, dermis_error* error);
 
 // Adds a bank to a scene, which keeps its bytes: it may then be destroyed.
 DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank,

@@ -91,6 +91,10 @@ struct Source {
     options.masks = masks;
     options.maxError = source.max_error;
     options.maxWeightError = source.max_weight_error;
+    if (source.root_motion_node != 0) {
+      options.rootMotion = {.node = source.root_motion_node - 1,
+                            .upAxis = source.up_axis == 0 ? 1 : source.up_axis - 1};
+    }
     if (source.meshes == nullptr) return;
     const std::size_t stride = source.meshes->size;
     for (std::uint32_t skin = 0; skin < source.skin_count; ++skin) {
@@ -206,6 +210,7 @@ dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info
     result.clips = known.infos.data();
     result.worst_error = known.report.worstError;
     result.worst = known.report.worst.c_str();
+    result.has_root_motion = known.clips.hasRootMotion() ? 1 : 0;
     give(info, result);
   });
 }
@@ -230,6 +235,19 @@ dermis_code dermis_sample_weights(const dermis_bank* bank, const dermis_clip_lay
     appendLayers(array(layers, layer_count, "layers"), all);
     must(sampleWeights(required(bank, "bank").clips, all, node,
                        array(weights, weight_count, "weights")));
+  });
+}
+
+dermis_code dermis_root_motion(const dermis_bank* bank, uint32_t clip, double from, double to,
+                               uint32_t hold, double displacement[3], double* turn,
+                               dermis_error* error) {
+  return guarded(error, [&] {
+    const RootMotion motion =
+        must(rootMotion(required(bank, "bank").clips, clip, from, to, hold != 0));
+    const std::span<double> results = array(displacement, 3, "displacement");
+    double& turned = required(turn, "turn");
+    std::ranges::copy(motion.displacement, results.begin());
+    turned = motion.turn;
   });
 }
 
