@@ -9,7 +9,6 @@
 #include "c_helpers.h"
 #include "dermis/clips.h"
 #include "dermis/gltf.h"
-#include "test_data.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -170,29 +169,6 @@ TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
   expectError(dermis_sample_weights(bank, &layer, 1, 1, weights.data(), 3, &error),
               "there are 3 weights, but node 1 has 4");
   expectError(dermis_sample_weights(bank, &layer, 1, 1, nullptr, 4, &error), "weights is null");
-
-  // A source of a model has the weights at rest.
-  gltf::Model morphed;
-  Owned<dermis_model> owner;
-  if (const auto data = testDataFolder()) {
-    const std::string path =
-        (*data / "AnimatedMorphCube/glTF-Binary/AnimatedMorphCube.glb").string();
-    dermis_model_source file = sized<dermis_model_source>();
-    file.path = path.c_str();
-    expectOk(dermis_model_load(&file, &owner, &error));
-    dermis_clips_source of = sized<dermis_clips_source>();
-    expectOk(dermis_model_clips(owner, &of, &error));
-    morphed = must(gltf::load(path));
-    const Skeleton views = gltf::skeleton(morphed);
-    std::uint32_t count = 0;
-    for (std::uint32_t node = 0; node < of.node_count; ++node) {
-      ASSERT_EQ(of.nodes[node].weight_count, views.nodes[node].weights.size());
-      count += of.nodes[node].weight_count;
-      EXPECT_TRUE(isSame(of.nodes[node].weights, views.nodes[node].weights.data(),
-                         views.nodes[node].weights.size_bytes()));
-    }
-    EXPECT_GT(count, 0u);
-  }
 }
 
 TEST_F(CClipsTest, RootMotionIsThatOfCpp) {

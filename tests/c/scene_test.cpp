@@ -882,6 +882,12 @@ TEST(CModelTest, MorphTargetsAndFilesInMemory) {
   EXPECT_EQ(weights[1], 0.75f);
   expectError(dermis_model_pose(model, 0, DERMIS_REST_POSE, 0, &joint, 1, weights, 3, &error),
               "morph_weight_count is 3");
+  dermis_clips_source clips = sized<dermis_clips_source>();
+  expectOk(dermis_model_clips(model, &clips, &error));
+  ASSERT_EQ(clips.nodes[0].weight_count, 2u);
+  EXPECT_EQ(clips.nodes[0].weights[0], 0);
+  EXPECT_EQ(clips.nodes[0].weights[1], 0.75f);
+  EXPECT_EQ(clips.nodes[1].weight_count, 0u);
 
   source.is_strict = 1;
   Owned<dermis_model> strict;

@@ -162,6 +162,8 @@ TEST(ClipsWeights, ByHand) {
   EXPECT_EQ(sampled(rig, {}, arm::hand), (Floats{0.125f, 0}));
   const ClipLayer inside{.time = 1};
   EXPECT_EQ(sampled(rig, {&inside, 1}, arm::hand), (Floats{0.125f, 0}));
+  const ClipLayer added{.clip = 2, .time = 1};
+  EXPECT_EQ(sampled(rig, {&added, 1}, arm::hand), (Floats{0.125f, 0}));
   expectNear(prop({{.time = 0.5}}), {0.5f, 0.5f, 0, -0.5f}, error);
   expectNear(prop({{.time = 5.5}}), {0.5f, 0.5f, 0, 0.5f}, error);
   // The clip that does not wrap stays at its end.
