@@ -165,6 +165,8 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
                       .culledOnGpu = description.culledOnGpu,
                       .figures = !description.pose && books_->figures_.size() != 0,
                       .morphsOnGpu = description.morphWriter != MorphWriter::cpu};
+  if (description.morphWriter > MorphWriter::clips)
+    return notAValue("the instance: its morphWriter", description.morphWriter, "MorphWriter");
   if (description.mesh) {
     const SceneMesh* mesh = books_->meshes_.find(description.mesh);
     if (mesh == nullptr) return unknownHandle("mesh", description.mesh);
