@@ -80,7 +80,8 @@ int main(int argc, char** argv) {
                                   .layout = row.layout,
                                   .bounds = row.bounds,
                                   .culledOnGpu = true,
-                                  .figures = true};
+                                  .figures = true,
+                                  .morphsOnGpu = true};
         for (const PipelineId id : samples::must(pipelines(needs, limits, Tuning{}))) {
           if (!seen.insert(id).second) continue;
           const auto pipeline = samples::must(vulkan::pipelineDescription(id));
