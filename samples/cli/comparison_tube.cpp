@@ -22,15 +22,15 @@ constexpr std::uint32_t zoneRings = 129;  // odd: one is in the middle
 constexpr std::uint32_t sides = 96;
 constexpr std::uint32_t firstOfZone = 1;  // after one ring at the end of the tube
 constexpr std::uint32_t rings = zoneRings + 2;
-constexpr double length = 1;
+constexpr double tubeLength = 1;
 constexpr double radius = 0.1;
 constexpr double zoneBegin = 0.3;
 constexpr double zoneEnd = 0.7;
-const glm::dvec3 middle(length / 2, 0, 0);
+const glm::dvec3 middle(tubeLength / 2, 0, 0);
 
 double ringPlace(std::uint32_t ring) {
   if (ring == 0) return 0;
-  if (ring == rings - 1) return length;
+  if (ring == rings - 1) return tubeLength;
   return zoneBegin + (zoneEnd - zoneBegin) * (ring - firstOfZone) / (zoneRings - 1);
 }
 
@@ -115,7 +115,7 @@ double ringArea(const Points& points, std::uint32_t ring) {
         glm::cross(pointOf(points, ring, side) - center, pointOf(points, ring, side + 1) - center) /
         2.0;
   }
-  return glm::length(area);
+  return glm::tubeLength(area);
 }
 
 /// Six times the signed volume of a tetrahedron whose apex is the tube's middle. The middle is
@@ -164,7 +164,7 @@ TubeShape shapeOf(const Points& points, const Points& rest, const glm::dmat3& tu
   for (std::uint32_t ring = 0; ring < rings; ++ring)
     shape.leastSection =
         std::min(shape.leastSection, ringArea(points, ring) / ringArea(rest, ring));
-  const glm::dvec3 end = middle + turn * glm::dvec3(length / 2, 0, 0);
+  const glm::dvec3 end = middle + turn * glm::dvec3(tubeLength / 2, 0, 0);
   shape.reach = 0;
   for (const glm::dvec3& point : points) {
     shape.leastRadius = std::min(shape.leastRadius, std::hypot(point.y, point.z) / radius);

@@ -6,6 +6,7 @@
 
 #include "scene/books.h"
 #include "scene/slot_map.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 
