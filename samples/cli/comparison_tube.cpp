@@ -115,7 +115,7 @@ double ringArea(const Points& points, std::uint32_t ring) {
         glm::cross(pointOf(points, ring, side) - center, pointOf(points, ring, side + 1) - center) /
         2.0;
   }
-  return glm::tubeLength(area);
+  return glm::length(area);
 }
 
 /// Six times the signed volume of a tetrahedron whose apex is the tube's middle. The middle is
