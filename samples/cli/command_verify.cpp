@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <new>
@@ -15,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "clip_verification.h"
 #include "commands.h"
 #include "kit/device.h"
 #include "kit/output_file.h"
@@ -94,7 +96,7 @@ Json describe(const VerifiedCase& verified) {
   json["variant"] = verified.variant;
   json["passed"] = verified.passed();
   if (!verified.passed()) json["failure"] = verified.failure();
-  json["vertices"] = comparison.compared;
+  json[verified.isOfClips() ? "points" : "vertices"] = comparison.compared;
   json["onlyFinite"] = comparison.exempt.onlyFinite;
   json["skipped"] = comparison.exempt.skipped;
   json["outOfRange"] = comparison.exempt.outOfRange;
@@ -135,6 +137,14 @@ void printReport(const std::vector<ModelVerification>& models) {
       if (!verified.passed()) ++summary.failures;
     }
     for (const auto& [method, summary] : byMethod) {
+      if (method == clipsMethod) {
+        fmt::print(
+            "{}  {}  {}: {} plays, {} points and morph weights compared{}; worst {:.2f} of "
+            "its bound\n",
+            summary.failures == 0 ? "passed" : "FAILED", samples::oneLine(model.model), method,
+            summary.poses.size(), summary.vertices, exceptions(summary), summary.worstPosition);
+        continue;
+      }
       fmt::print(
           "{}  {}  {}: {} poses, {} variants, {} vertices compared{}; worst position {:.2f} of its "
           "bound, normal {:.2f}{}\n",
@@ -280,7 +290,18 @@ class Verifier {
     const std::vector<PoseToVerify> poses = posesToVerify(*scene->model);
     const SceneCases cases = casesOf(*scene, pool_.first(), poses.size(), coverage_);
     samples::Progress progress(model, cases.batches.size());
-    add(model, verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); }));
+    Cases verified = verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); });
+    if (verified) verified = withClips(*scene, std::move(*verified));
+    add(model, std::move(verified));
+  }
+
+  Cases withClips(const Scene& scene, std::vector<VerifiedCase> cases) {
+    std::vector<std::string> warnings;
+    Cases ofClips = verifyClips(pool_, scene, coverage_, warnings);
+    if (!ofClips) return ofClips;
+    for (const std::string& warning : warnings) reportWarning(warning);
+    std::ranges::move(*ofClips, std::back_inserter(cases));
+    return cases;
   }
 
   void add(const std::string& model, Cases cases) {

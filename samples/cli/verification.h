@@ -52,7 +52,12 @@ struct SceneCases {
 SceneCases sceneCases(std::vector<Figure> figures, std::vector<samples::Division> divisions,
                       std::vector<OutputToVerify> outputs, std::size_t poseCount);
 
-/// One primitive in one pose, with one method and one output layout.
+inline constexpr const char* clipsMethod = "clips";  ///< of cases that compare no vertices
+inline constexpr const char* weightsVariant = "morph weights";  ///< of cases of clips
+
+/// One primitive in one pose, with one method and one output layout. Or what a figure that plays
+/// clips has as the pose of a skin or the morph weights of a node: then `comparison` counts points
+/// or weights, and its vertices are joints or weights.
 struct VerifiedCase {
   std::string part;
   std::string method;
@@ -66,6 +71,7 @@ struct VerifiedCase {
     return comparison.passed() && wrong.empty() &&
            comparison.compared + comparison.exempt.onlyFinite != 0;
   }
+  bool isOfClips() const { return method == clipsMethod; }
   std::string failure() const;  ///< a sentence, if it did not pass
 };
 

@@ -620,7 +620,8 @@ ExitStatus playOnDevice(OpenDevice& open, const Character& character, const Pack
   vulkan::SceneRecorder recorder =
       createOnDevice(open.context, character, clips, options, hasTimestamps);
   Crowd crowd(recorder.scene(), character, clips, options);
-  const crowd::TickPoses poses(character, clips, open);
+  VulkanTarget sampling(device, open.context);
+  const crowd::TickPoses poses(character, clips, sampling);
   CharacterCheck check = checkOf(character, poses);
   Report report(character, options, device.info().name, driverVersion(device));
   const std::uint64_t inFlight = options.framesInFlight;
@@ -673,7 +674,8 @@ ExitStatus playOnCpu(const Character& character, const PackedClips& clips, const
   cpu::SceneRunner runner =
       must(cpu::SceneRunner::create(describeScene(character, clips, options)));
   Crowd crowd(runner.scene(), character, clips, options);
-  const crowd::TickPoses poses(character, clips);
+  CpuTarget sampling;
+  const crowd::TickPoses poses(character, clips, sampling);
   CharacterCheck check = checkOf(character, poses);
   Report report(character, options, CpuTarget().name(), "");
   Cost cost;

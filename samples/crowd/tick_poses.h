@@ -7,28 +7,23 @@
 #include <vector>
 
 #include "dermis/clips.h"
+#include "kit/batch_runner.h"
 #include "kit/character.h"
-#include "kit/device.h"
 
 namespace crowd {
 
 class TickPoses {
  public:
-  /// As the CPU samples them: `samplePose`.
-  TickPoses(const dermis::samples::Character& character, const dermis::PackedClips& bank);
-  /// As the device does. The bits of a pose depend only on what is played.
+  /// As the target samples them. The bits of a pose depend only on what is played.
   TickPoses(const dermis::samples::Character& character, const dermis::PackedClips& bank,
-            dermis::samples::OpenDevice& open);
+            dermis::samples::BatchTarget& target);
 
   std::span<const dermis::JointMatrix> pose(dermis::samples::PoseKey key, std::uint32_t skin) const;
 
-  /// The largest distance of a point that a joint moves from where the file's clips have it,
-  /// divided by its bound (`reference::samplePose`). Points at the joint, and a meter away.
+  /// The largest `Comparison::worstPosition` of `comparePose`.
   double worst() const { return worst_; }
 
  private:
-  void check(const dermis::PackedClips& bank);
-
   const dermis::samples::Character* character_;
   std::vector<std::vector<std::vector<dermis::JointMatrix>>> poses_;  ///< by clip; by tick, skin
   double worst_ = 0;

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
@@ -150,6 +151,9 @@ class BatchTarget {
   /// The first is the default.
   virtual std::vector<Division> divisions() const = 0;
   virtual std::unique_ptr<BatchRunner> runner(const RunOptions& options) = 0;
+  /// What figures that play these layers have as poses: figure by figure, one for each skin.
+  virtual Result<std::vector<std::vector<JointMatrix>>> samplePoses(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) = 0;
 
   /// Runs a single batch.
   Result<BatchResult> run(std::span<const SkinRequest> requests, const RunOptions& options = {}) {
@@ -166,6 +170,9 @@ class VulkanTarget : public BatchTarget {
   std::span<const Method> methods() const override;
   std::vector<Division> divisions() const override;
   std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
+  /// As a scene samples them.
+  Result<std::vector<std::vector<JointMatrix>>> samplePoses(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
 
  private:
   Device& device_;
@@ -186,6 +193,8 @@ class CpuTarget : public BatchTarget {
   std::span<const Method> methods() const override;
   std::vector<Division> divisions() const override;
   std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
+  Result<std::vector<std::vector<JointMatrix>>> samplePoses(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
 
  private:
   std::string instructions_;

@@ -167,5 +167,17 @@ std::unique_ptr<BatchRunner> CpuTarget::runner(const RunOptions& options) {
   if (own.instructions.empty()) own.instructions = instructions_;
   return std::make_unique<CpuRunner>(own);
 }
+Result<std::vector<std::vector<JointMatrix>>> CpuTarget::samplePoses(
+    const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) {
+  std::vector<std::vector<JointMatrix>> poses;
+  for (const std::vector<ClipLayer>& layers : plays) {
+    for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
+      std::vector<JointMatrix>& pose = poses.emplace_back(bank.jointCount(skin));
+      if (Result<void> sampled = samplePose(bank, layers, skin, pose); !sampled)
+        return sampled.error();
+    }
+  }
+  return poses;
+}
 
 }  // namespace dermis::samples

@@ -1,10 +1,13 @@
-// Batches on a device.
+// Batches on a device, and poses of a scene's figures.
 
 #include <algorithm>
 #include <cstring>
 
+#include "dermis/scene.h"
+#include "dermis/vulkan/scene_recorder.h"
 #include "kit/batch_runner.h"
 #include "kit/device.h"
+#include "kit/program.h"
 
 namespace dermis::samples {
 namespace {
@@ -127,6 +130,75 @@ Result<BatchResult> VulkanRunner::skin() {
 /// Results with the other tunings must have the same bits as results with the first.
 constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
 
+/// A vertex that follows joint 0.
+PackedMesh pointMesh() {
+  constexpr std::array<float, 3> place{0, 0, 0};
+  constexpr float joint = 0, weight = 1;
+  const InfluenceSet influences{floatAttribute(&joint, 1, 1), floatAttribute(&weight, 1, 1)};
+  MeshView mesh;
+  mesh.name = "point";
+  mesh.vertexCount = 1;
+  mesh.positions = floatAttribute(place.data(), 1, 3);
+  mesh.influenceSets = {&influences, 1};
+  return must(pack(mesh, 1));
+}
+
+/// Adds a figure for each of `plays`. Returns where the device keeps their poses.
+std::vector<vulkan::BufferRange> addFigures(vulkan::SceneRecorder& recorder,
+                                            const PackedClips& bank,
+                                            std::span<const std::vector<ClipLayer>> plays) {
+  Scene& scene = recorder.scene();
+  const ClipsHandle clips = must(scene.addClips(PackedClips(bank)));
+  // A pose is sampled when an instance is skinned with it.
+  InstanceDescription point;
+  point.mesh = must(scene.addMesh(pointMesh()));
+  std::vector<vulkan::BufferRange> ranges;
+  for (const std::vector<ClipLayer>& layers : plays) {
+    const FigurePlay play{must(scene.addFigure(clips)), layers};
+    must(scene.play({&play, 1}));
+    for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
+      point.pose = must(scene.pose(play.figure, skin));
+      must(recorder.prepare(point));
+      must(scene.addInstance(point));
+      ranges.push_back(must(recorder.poseRange(point.pose)));
+    }
+  }
+  return ranges;
+}
+
+/// Throws `Failure`.
+std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan::Context& context,
+                                                   const PackedClips& bank,
+                                                   std::span<const std::vector<ClipLayer>> plays) {
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
+  const std::vector<vulkan::BufferRange> ranges = addFigures(recorder, bank, plays);
+  std::uint64_t size = 0;
+  for (const vulkan::BufferRange& range : ranges) size += range.size;
+  const MappedBuffer copy =
+      must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
+  must(recorder.scene().beginFrame(1, 0));
+  must(device.run([&](VkCommandBuffer commandBuffer) -> Result<void> {
+    if (Result<void> recorded = recorder.record(commandBuffer); !recorded) return recorded;
+    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    std::uint64_t offset = 0;
+    for (const vulkan::BufferRange& range : ranges) {
+      const VkBufferCopy region{range.offset, offset, range.size};
+      device.functions().CmdCopyBuffer(commandBuffer, range.buffer, copy.handle(), 1, &region);
+      offset += range.size;
+    }
+    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    return {};
+  }));
+  std::vector<std::vector<JointMatrix>> poses;
+  const std::byte* from = copy.bytes().data();
+  for (const vulkan::BufferRange& range : ranges) {
+    std::vector<JointMatrix>& pose = poses.emplace_back(range.size / sizeof(JointMatrix));
+    std::memcpy(pose.data(), from, range.size);
+    from += range.size;
+  }
+  return poses;
+}
+
 }  // namespace
 
 std::string VulkanTarget::name() const {
@@ -150,6 +222,15 @@ std::vector<Division> VulkanTarget::divisions() const {
 }
 std::unique_ptr<BatchRunner> VulkanTarget::runner(const RunOptions& options) {
   return std::make_unique<VulkanRunner>(device_, context_, options);
+}
+
+Result<std::vector<std::vector<JointMatrix>>> VulkanTarget::samplePoses(
+    const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) {
+  try {
+    return sampledPoses(device_, context_, bank, plays);
+  } catch (const Failure& failure) {
+    return failure.error();
+  }
 }
 
 Result<BatchResult> runBatch(Device& device, vulkan::Context& context,

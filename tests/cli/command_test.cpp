@@ -491,7 +491,7 @@ TEST(CommandTest, NoModelSpoilsTheReportOfAnother) {
   }
   const std::size_t methods = samples::CpuTarget().methods().size();
   EXPECT_EQ(countOf(result.output, huge), methods) << "each with a verdict";
-  EXPECT_EQ(countOf(result.output, "passed  " + bar), methods) << result.output;
+  EXPECT_EQ(countOf(result.output, "passed  " + bar), methods + 1) << "with its clips";
   const nlohmann::json models = nlohmann::json::parse(readText(json)).at("models");
   ASSERT_EQ(models.size(), 5u);
   EXPECT_TRUE(models[0].contains("error"));

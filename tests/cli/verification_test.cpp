@@ -1,10 +1,11 @@
-// How `dermis verify` shares its cases out among threads.
+// How `dermis verify` shares its cases out among threads, and which cases it has.
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -19,7 +20,9 @@
 #include <vector>
 
 #include "dermis_command.h"
+#include "gltf_builder.h"
 #include "kit/batch_runner.h"
+#include "kit/clip_check.h"
 #include "kit/verification_product.h"
 
 namespace dermis::test {
@@ -222,6 +225,112 @@ TEST(VerificationTest, QuickLeavesOutCasesOfAModelToo) {
 
 TEST(VerificationTest, ThreadsChangeNothingOnTheCpu) {
   expectTheSameInThreads({"verify", barModel, "--random", "--device", "cpu"});
+}
+
+/// Clips of a model: all have one channel.
+void addClip(FileBuilder& file, const char* name, int node, const char* path,
+             const std::vector<float>& times, std::size_t values) {
+  file.json["animations"].push_back(
+      {{"name", name},
+       {"samplers", {{{"input", file.addFloats(times, "SCALAR")}, {"output", values}}}},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
+}
+
+std::string write(const FileBuilder& file, const std::string& name) {
+  const std::string path = outFile(name);
+  std::ofstream(path) << file.text();
+  return path;
+}
+
+TEST(VerificationTest, ClipsAreVerifiedAsScenesPlayThem) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["targets"] = {
+      {{"POSITION", file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3")}}};
+  file.json["skins"][0]["name"] = "figure";
+  addClip(file, "bend", 2, "rotation", {0, 1},
+          file.addFloats({0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4"));
+  addClip(file, "grow", 0, "weights", {0, 2}, file.addFloats({0.25f, 0.75f}, "SCALAR"));
+  const std::string model = write(file, "clips.gltf");
+  const std::string json = outFile("clips.json"), junit = outFile("clips.xml");
+  const CommandResult result =
+      dermis({"verify", model, "--device", "cpu", "--json", json, "--junit", junit});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+
+  std::map<std::string, std::set<std::string>> parts;  // by pose
+  std::uint64_t points = 0;
+  double worst = 0;
+  for (const nlohmann::json& one :
+       nlohmann::json::parse(readText(json)).at("models")[0].at("cases")) {
+    if (one.at("method") != "clips") continue;
+    EXPECT_GT(one.at("points").get<int>(), 0) << one;
+    points += one.at("points").get<std::uint64_t>();
+    worst = std::max(worst, one.at("worstPositionOfBound").get<double>());
+    parts[one.at("pose")].insert(one.at("mesh").get<std::string>() + ", " +
+                                 one.at("variant").get<std::string>());
+  }
+  for (const char* pose :
+       {"rest pose", "clip 0 'bend' at 0 s", "clip 0 'bend' at 0.31 s", "clip 1 'grow' at 3.54 s",
+        "clip 1 'grow' at 3.54 s, held",
+        "clip 0 'bend' at 0.31 s, weight 0.25 + clip 1 'grow' at 1.54 s, weight 0.75, mask 1",
+        "clip 1 'grow' at 1.54 s, weight 0.75, mask 1 + additive clip 0 'bend' at 0.4 s"}) {
+    EXPECT_EQ(parts[pose],
+              (std::set<std::string>{"skin 0 'figure', joint matrices", "node 0, morph weights"}))
+        << pose;
+  }
+  EXPECT_EQ(parts.size(), 13u);
+  EXPECT_GT(worst, 0);
+  const std::string line = "passed  " + model + "  clips: 13 plays, " + std::to_string(points) +
+                           " points and morph weights compared; worst ";
+  EXPECT_NE(result.output.find(line), std::string::npos) << result.output;
+  EXPECT_NE(readText(junit).find("<testcase classname=\"dermis.verify.clips\" name=\"node 0, clip "
+                                 "1 'grow' at 0 s, morph weights\"/>"),
+            std::string::npos);
+}
+
+TEST(VerificationTest, ClipsThatCannotBePackedAreAWarning) {
+  FileBuilder file = skinnedTriangle();
+  // For so long a clip, keys cannot be near enough to each other.
+  addClip(file, "fast", 2, "rotation", {0, 0.001f, 0.002f, 5000},
+          file.addFloats({0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC4"));
+  const std::string json = outFile("fast.json");
+  const CommandResult result =
+      dermis({"verify", write(file, "fast.gltf"), "--quick", "--device", "cpu", "--json", json});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_NE(result.errors.find("clips are not verified: "), std::string::npos) << result.errors;
+  EXPECT_FALSE(casesByMethod(json).contains("clips"));
+}
+
+TEST(VerificationTest, PosesAndWeightsAwayFromTheClipsAreFound) {
+  const std::array<std::uint32_t, 2> joints{0, 1};
+  std::array<JointMatrix, 2> inverseBind, pose;
+  const SkeletonSkin skin{"skin", joints, inverseBind};
+  reference::SampledPose expected;
+  expected.joints.resize(2, {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}});
+  expected.bounds = {{0.1, 0.01}, {0.1, 0.01}};
+  const auto compare = [&] { return samples::comparePose(pose, expected, skin); };
+  EXPECT_TRUE(compare().passed());
+  EXPECT_EQ(compare().compared, 8u);
+  pose[1].m[0][3] = 0.09f;
+  EXPECT_TRUE(compare().passed());
+  pose[1].m[0][3] = 0.11f;
+  pose[1].m[2][1] = 0.02f;
+  EXPECT_EQ(compare().failures, 2u);
+  EXPECT_EQ(compare().firstFailure, 1u);
+  EXPECT_NEAR(compare().worstPosition, 2, 1e-6);
+  pose[1].m[2][1] = NAN;
+  EXPECT_GT(compare().failures, 0u);
+  // Without an inverse: only finite.
+  expected.bounds[1] = {HUGE_VAL, HUGE_VAL};
+  EXPECT_EQ(compare().failures, 1u);
+  pose[1].m[2][1] = 5;
+  EXPECT_TRUE(compare().passed());
+  EXPECT_EQ(compare().exempt.onlyFinite, 1u);
+
+  const std::array<float, 2> weights{0.5f, 0.25f};
+  EXPECT_TRUE(samples::compareWeights(weights, {{0.5, 0.2}, {0.1, 0.1}}).passed());
+  const Comparison wrong = samples::compareWeights(weights, {{0.5, 0.1}, {0.1, 0.1}});
+  EXPECT_EQ(wrong.failures, 1u);
+  EXPECT_EQ(wrong.firstFailure, 1u);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -15,6 +14,7 @@
 
 #include "dermis/verify.h"
 #include "gltf_builder.h"
+#include "kit/clip_check.h"
 #include "matrix_of.h"
 #include "model_files.h"
 #include "random_number.h"
@@ -59,25 +59,6 @@ double largestEntry(const dmat4& matrix) {
 }
 
 std::function<ClipSampler(const PackedClips&)> makeSampler;
-
-/// When a component jumps by more than this share of the largest.
-std::vector<double> jumpsOf(const ChannelView& channel, double share) {
-  std::vector<double> jumps;
-  if (channel.interpolation == Interpolation::cubicSpline) return jumps;
-  float largest = 0;
-  for (const float value : channel.values) largest = std::max(largest, std::abs(value));
-  const std::size_t width = channel.values.size() / channel.times.size();
-  for (std::size_t key = 1; key < channel.times.size(); ++key) {
-    if (channel.interpolation != Interpolation::step &&
-        channel.times[key] != channel.times[key - 1])
-      continue;
-    float jump = 0;
-    for (std::size_t i = key * width; i < (key + 1) * width; ++i)
-      jump = std::max(jump, std::abs(channel.values[i] - channel.values[i - width]));
-    if (double{jump} > share * double{largest}) jumps.push_back(double{channel.times[key]});
-  }
-  return jumps;
-}
 
 }  // namespace
 
@@ -253,23 +234,8 @@ double PackedRig::checkWeights(std::span<const ClipLayer> layers) const {
 }
 
 bool PackedRig::isNearJump(const ClipLayer& layer) const {
-  const ClipView& clip = clips[layer.clip];
-  const double time = double{clipTime(bank->clip(layer.clip), layer.time, layer.hold)};
-  for (const ChannelView& channel : clip.channels) {
-    const std::vector<double> all = jumpsOf(channel, 0);
-    std::vector<double> large = jumpsOf(channel, 0.05);
-    large.insert(large.begin(), 0);
-    large.push_back(clip.duration);
-    for (const double jump : all) {
-      // The interval of a jump has no other that counts. The time is rounded to 1/256 of it.
-      const auto after = std::ranges::upper_bound(large, jump);
-      const auto before = std::ranges::lower_bound(large, jump);
-      const double interval = (after == large.end() ? clip.duration : *after) -
-                              (before == large.begin() ? 0 : *std::prev(before));
-      if (std::abs(time - jump) <= interval / 256 + 1e-6 * clip.duration) return true;
-    }
-  }
-  return false;
+  return samples::isNearJump(clips[layer.clip],
+                             double{clipTime(bank->clip(layer.clip), layer.time, layer.hold)});
 }
 
 std::vector<ClipLayer> randomLayers(const PackedRig& rig, std::mt19937& random) {

@@ -68,7 +68,7 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
   std::map<std::string, std::size_t> cases;
   for (const nlohmann::json& verified : report.at("models")[0].at("cases")) {
     EXPECT_EQ(verified.at("passed"), !verified.contains("failure"));
-    EXPECT_GT(verified.at("vertices").get<int>(), 0) << verified;
+    EXPECT_GT(verified.value("vertices", verified.value("points", 0)), 0) << verified;
     ++cases[verified.at("method")];
     if (verified.at("passed").get<bool>()) continue;
     ++failed;
@@ -87,6 +87,23 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
   EXPECT_EQ(countOf(xml, "failures=\"1\" errors=\"0\""), 2u) << "of the model, and of all";
   EXPECT_EQ(countOf(xml, "<failure message=\"" + what), 1u);
   EXPECT_EQ(countOf(xml, "<failure"), 1u);
+}
+
+// A bit of an exponent of the first pose that is read back, the rest pose.
+TEST(WrongBytesCommandsTest, VerifyTellsWhichPoseOfAClipIsWrong) {
+  REQUIRE_DEVICE();
+  const std::string bar = std::string(sampleModels) + "/bar.glb";
+  const CommandResult result =
+      runWithWrongBytes({dermisProgram, "verify", bar, "--quick", "--threads", "1"},
+                        "1 1000000 " + std::to_string(VK_BUFFER_USAGE_TRANSFER_DST_BIT) + " 3 1");
+  EXPECT_EQ(result.status, 1) << result.errors;
+  EXPECT_EQ(countOf(result.output, "FAILED  "), 1u) << result.output;
+  EXPECT_EQ(countOf(result.output, "FAILED  " + bar + "  clips: "), 1u) << result.output;
+  EXPECT_EQ(countOf(result.output,
+                    ", clips, rest pose, joint matrices: 1 points are outside their "
+                    "bound; the first is of joint 0."),
+            1u)
+      << result.output;
 }
 
 // All bits of a few words of the output, in every frame that is read back.
