@@ -60,6 +60,7 @@ TEST(GltfMorph, SkeletonAndClipsHaveWeights) {
   file.json["meshes"][0]["weights"] = {0.25};
   model = expectNoted(file, "mesh 0: it has 1 weights for 2 morph targets");
   EXPECT_EQ(weightsOf(model), (Floats{0.25f, 0}));
+  file.json["meshes"][0]["weights"] = {0.25, 0};  // the notes of one kind are joined
   file.json["nodes"][0]["weights"] = {0.5};
   model = expectNoted(file, "node 0: it has 1 weights for 2 morph targets");
   EXPECT_EQ(weightsOf(model), (Floats{0.5f, 0}));
