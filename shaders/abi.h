@@ -181,6 +181,24 @@ struct StepRecord {
 };
 DERMIS_CONSTANT STEP_WORDS = 4u;
 
+// ---- Rigs: engine/src/core/rig/blob.h has the records. Of a rig, kernels know:
+DERMIS_CONSTANT RIG_COUNTS = 4u;  // words: written and driven joints, given and driven weights
+DERMIS_CONSTANT RIG_DRIVERS = 8u;  // words: the offset of the drivers, and their number
+DERMIS_CONSTANT RIG_DRIVER_WORDS = 4u;
+DERMIS_CONSTANT RIG_TWIST = 0u;  // kinds of drivers
+DERMIS_CONSTANT RIG_CORRECTIVE = 1u;
+DERMIS_CONSTANT RIG_CHAIN = 2u;
+DERMIS_CONSTANT RIG_LINEAR = 3u;
+DERMIS_CONSTANT RIG_SENSOR_WORDS = 28u;
+DERMIS_CONSTANT RIG_CORRECTIVE_WORDS = 8u;
+DERMIS_CONSTANT RIG_OFFSET_JOINT_WORDS = 28u;
+DERMIS_CONSTANT RIG_OFFSET_WORDS = 12u;
+DERMIS_CONSTANT RIG_PIECE_WORDS = 4u;
+DERMIS_CONSTANT RIG_CHAIN_JOINT_WORDS = 28u;
+DERMIS_CONSTANT RIG_LINEAR_WORDS = 4u;
+DERMIS_CONSTANT RIG_TERM_WORDS = 16u;
+DERMIS_CONSTANT RIG_NO_JOINT = 0xffffffffu;
+
 // ---- Records. A struct of scalars has the same layout in C++ and in std430. NAME_WORDS is the
 // size of a record in the tables or in a packed mesh. The tables are one buffer of words. Records
 // in it begin at multiples of four words, except ActiveMorph.

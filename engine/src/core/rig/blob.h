@@ -1,0 +1,147 @@
+// The words of a packed rig. All offsets count words from the beginning, and are multiples of 4.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "abi.h"
+#include "dermis/rig.h"
+
+namespace dermis {
+
+inline constexpr std::uint32_t rigMagic = 0x47495244u;  // "DRIG"
+inline constexpr std::uint32_t rigVersion = 1;
+
+/// The first four words are those of a packed mesh header, so that the checksum is computed in the
+/// same way.
+struct RigHeader {
+  std::uint32_t magic, version, checksum, wordCount;
+  std::uint32_t writtenJoints, drivenJoints, givenWeights, drivenWeights;
+  std::uint32_t drivers, driverCount;  ///< in the order in which they are computed
+  std::uint32_t weightsOf;
+  std::uint32_t isRigid;
+  float residual;
+  std::uint32_t mostInputs;  ///< of a corrective
+  std::uint32_t unused[2];
+};
+static_assert(sizeof(RigHeader) == 64);
+
+/// Numbers of a driver's kind: abi::RIG_TWIST and the like.
+struct RigDriver {
+  std::uint32_t kind;
+  std::uint32_t data;
+  std::uint32_t count;  ///< chain: pieces; linear: terms
+  std::uint32_t unused;
+};
+static_assert(sizeof(RigDriver) == 4 * abi::RIG_DRIVER_WORDS);
+
+/// How the rotation of a joint relative to its parent and its bind pose is found: it is that of
+/// left × (parent's matrix)⁻¹ × (joint's matrix) × right.
+struct RigSensor {
+  std::uint32_t joint, parent;  ///< abi::RIG_NO_JOINT: none
+  std::uint32_t unused[2];
+  float left[3][4], right[3][4];  ///< the last column is 0
+};
+static_assert(sizeof(RigSensor) == 4 * abi::RIG_SENSOR_WORDS);
+
+// `driven` counts driven joints, `parent` all joints.
+
+struct RigTwist {
+  RigSensor sensor;
+  std::uint32_t driven, parent;
+  float share;
+  std::uint32_t unused;
+  float axis[4];       ///< unit, in the axes of the joint of the sensor
+  float direction[4];  ///< the same in bind space
+  float origin[4];     ///< of the driven joint in bind space
+};
+static_assert(sizeof(RigTwist) == 4 * (abi::RIG_SENSOR_WORDS + 16));
+
+/// After it: a `RigSensor` for each input; for each example a unit quaternion for each input; for
+/// each four weights and each example four coefficients; for each joint a `RigOffsetJoint`, then
+/// for each example a `RigOffset` of coefficients.
+struct RigCorrective {
+  std::uint32_t inputCount, exampleCount, weightCount, jointCount;
+  std::uint32_t firstWeight;
+  float factor;  ///< of squares of distances in the exponential; 0: linear functions
+  std::uint32_t unused[2];
+};
+static_assert(sizeof(RigCorrective) == 4 * abi::RIG_CORRECTIVE_WORDS);
+
+struct RigOffsetJoint {
+  std::uint32_t driven, parent;
+  std::uint32_t unused[2];
+  float bind[3][4], inverse[3][4];
+};
+static_assert(sizeof(RigOffsetJoint) == 4 * abi::RIG_OFFSET_JOINT_WORDS);
+
+/// Differences from no offset.
+struct RigOffset {
+  float translation[4], rotation[4], scale[4];
+};
+static_assert(sizeof(RigOffset) == 4 * abi::RIG_OFFSET_WORDS);
+
+/// Between two joints of a chain.
+struct RigPiece {
+  std::uint32_t begin, end;          ///< joints
+  std::uint32_t joints, jointCount;  ///< `RigChainJoint`s; their offset
+};
+static_assert(sizeof(RigPiece) == 4 * abi::RIG_PIECE_WORDS);
+
+/// The place on the curve is A a + h t + B b + (1 - h) s, where A, B are the matrices of both ends
+/// without translation, and t, s their translations; its direction is A c + B d + g (t - s).
+struct RigChainJoint {
+  std::uint32_t driven;
+  float share;       ///< from the beginning of the piece to its end
+  float weight;      ///< h
+  float slope;       ///< g
+  float a[4], b[4];  ///< the fourth number of b is 1 - h
+  float c[4], d[4];
+  float point[4], direction[4];  ///< on the curve in bind pose; the direction is of unit length
+};
+static_assert(sizeof(RigChainJoint) == 4 * abi::RIG_CHAIN_JOINT_WORDS);
+
+/// After it: `RigTerm`s.
+struct RigLinear {
+  std::uint32_t driven, parent;
+  std::uint32_t unused[2];
+};
+static_assert(sizeof(RigLinear) == 4 * abi::RIG_LINEAR_WORDS);
+
+struct RigTerm {
+  std::uint32_t weight;
+  std::uint32_t unused[3];
+  float matrix[3][4];
+};
+static_assert(sizeof(RigTerm) == 4 * abi::RIG_TERM_WORDS);
+
+/// Reads a rig whose words were checked, or its header.
+struct RigBlob {
+  std::span<const std::uint32_t> words;
+  RigHeader header;
+
+  explicit RigBlob(std::span<const std::uint32_t> blob) : words(blob) { read(header, 0); }
+  explicit RigBlob(const PackedRig& rig) : RigBlob(std::span<const std::uint32_t>(rig.words_)) {}
+
+  template <typename Record>
+  void read(Record& record, std::size_t offset) const {
+    std::memcpy(&record, &words[offset], sizeof(Record));
+  }
+  template <typename Record>
+  Record at(std::size_t offset) const {
+    Record record;
+    read(record, offset);
+    return record;
+  }
+  RigDriver driver(std::size_t number) const {
+    return at<RigDriver>(header.drivers + number * abi::RIG_DRIVER_WORDS);
+  }
+};
+
+/// Checks the length, the version, the checksum, every offset and index, and that numbers are
+/// finite and drivers read what is computed before.
+Result<void> checkRig(std::span<const std::uint32_t> words);
+
+}  // namespace dermis

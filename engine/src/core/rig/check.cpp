@@ -1,0 +1,237 @@
+// Whether stored bytes are a rig, and what it is asked.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "pack/check.h"
+#include "rig/blob.h"
+#include "strict_floating_point.h"
+
+namespace dermis {
+namespace {
+
+Error damagedRig(const std::string& what) {
+  return {ErrorCode::invalidData, "packed rig: " + what};
+}
+
+/// Goes through the drivers in their order.
+class RigCheck {
+ public:
+  explicit RigCheck(std::span<const std::uint32_t> words)
+      : rig_(words), isDriven_(rig_.header.drivenJoints), isWeighed_(weights(), false) {
+    for (std::size_t i = 0; i < rig_.header.givenWeights; ++i) isWeighed_[i] = true;
+  }
+
+  /// Whether the header's counts fit the words, so that this object may be made.
+  static bool isSmall(const RigHeader& header) {
+    return header.writtenJoints > 0 && header.writtenJoints <= maxPoseJoints &&
+           header.drivenJoints <= maxPoseJoints - header.writtenJoints &&
+           header.givenWeights <= header.wordCount && header.drivenWeights <= header.wordCount;
+  }
+
+  Result<void> run() {
+    const RigHeader& header = rig_.header;
+    if (!isSection(header.drivers, header.driverCount, abi::RIG_DRIVER_WORDS) ||
+        !std::isfinite(header.residual))
+      return damagedRig("its header does not fit its drivers");
+    for (std::size_t i = 0; i < header.driverCount; ++i) {
+      if (!isDriver(rig_.driver(i)))
+        return damagedRig("driver " + std::to_string(i) + " is not valid");
+    }
+    for (const std::vector<bool>* made : {&isDriven_, &isWeighed_}) {
+      if (std::ranges::find(*made, false) != made->end())
+        return damagedRig("a joint or a weight has no driver");
+    }
+    return {};
+  }
+
+ private:
+  std::size_t weights() const {
+    return std::size_t{rig_.header.givenWeights} + rig_.header.drivenWeights;
+  }
+  bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t wordsEach) const {
+    const std::uint64_t total = rig_.words.size();
+    return offset % 4 == 0 && offset >= sizeof(RigHeader) / 4 && offset <= total &&
+           count <= (total - offset) / wordsEach;
+  }
+  template <std::size_t size>
+  static bool areFinite(const float (&numbers)[size]) {
+    return std::ranges::all_of(numbers, [](float number) { return std::isfinite(number); });
+  }
+  template <std::size_t rows>
+  static bool areFinite(const float (&matrix)[rows][4]) {
+    return std::ranges::all_of(matrix, [](const auto& row) { return areFinite(row); });
+  }
+  bool areFinite(std::size_t offset, std::size_t count) const {
+    for (std::size_t i = offset; i < offset + count; ++i) {
+      if (!std::isfinite(std::bit_cast<float>(rig_.words[i]))) return false;
+    }
+    return true;
+  }
+  bool isKnown(std::uint32_t joint) const {
+    const std::uint32_t written = rig_.header.writtenJoints;
+    return joint < written || (joint - written < isDriven_.size() && isDriven_[joint - written]);
+  }
+  bool isParent(std::uint32_t joint) const { return joint == abi::RIG_NO_JOINT || isKnown(joint); }
+  bool drives(std::uint32_t driven) {
+    if (driven >= isDriven_.size() || isDriven_[driven]) return false;
+    isDriven_[driven] = true;
+    return true;
+  }
+  bool isSensor(const RigSensor& sensor) const {
+    return isKnown(sensor.joint) && isParent(sensor.parent) && areFinite(sensor.left) &&
+           areFinite(sensor.right);
+  }
+
+  bool isDriver(const RigDriver& driver) {
+    switch (driver.kind) {
+      case abi::RIG_TWIST:
+        return isTwist(driver.data);
+      case abi::RIG_CORRECTIVE:
+        return isCorrective(driver.data);
+      case abi::RIG_CHAIN:
+        return isChain(driver);
+      case abi::RIG_LINEAR:
+        return isLinear(driver);
+      default:
+        return false;
+    }
+  }
+
+  bool isTwist(std::uint32_t data) {
+    if (!isSection(data, 1, sizeof(RigTwist) / 4)) return false;
+    const auto twist = rig_.at<RigTwist>(data);
+    return isSensor(twist.sensor) && isParent(twist.parent) && std::abs(twist.share) <= 1 &&
+           areFinite(twist.axis) && areFinite(twist.direction) && areFinite(twist.origin) &&
+           drives(twist.driven);
+  }
+
+  bool isCorrective(std::uint32_t data) {
+    if (!isSection(data, 1, abi::RIG_CORRECTIVE_WORDS)) return false;
+    const auto record = rig_.at<RigCorrective>(data);
+    const std::uint64_t inputs = record.inputCount, examples = record.exampleCount;
+    if (inputs == 0 || inputs > rig_.header.mostInputs || examples == 0 ||
+        examples > maxRigExamples || !(record.factor <= 0) || !std::isfinite(record.factor))
+      return false;
+    std::uint64_t offset = data + std::uint64_t{abi::RIG_CORRECTIVE_WORDS};
+    if (!isSection(offset, inputs, abi::RIG_SENSOR_WORDS)) return false;
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (!isSensor(rig_.at<RigSensor>(offset + i * abi::RIG_SENSOR_WORDS))) return false;
+    }
+    offset += inputs * abi::RIG_SENSOR_WORDS;
+    const std::uint64_t numbers = 4 * examples * (inputs + (record.weightCount + 3ull) / 4);
+    if (!isSection(offset, numbers, 1) || !areFinite(offset, numbers)) return false;
+    offset += numbers;
+    const std::uint64_t ofJoint = abi::RIG_OFFSET_JOINT_WORDS + examples * abi::RIG_OFFSET_WORDS;
+    if (!isSection(offset, record.jointCount, ofJoint)) return false;
+    for (std::size_t i = 0; i < record.jointCount; ++i, offset += ofJoint) {
+      const auto joint = rig_.at<RigOffsetJoint>(offset);
+      if (!isParent(joint.parent) || !areFinite(offset + 4, ofJoint - 4) || !drives(joint.driven))
+        return false;
+    }
+    if (record.firstWeight > weights() || record.weightCount > weights() - record.firstWeight)
+      return false;
+    for (std::size_t i = 0; i < record.weightCount; ++i) {
+      if (isWeighed_[record.firstWeight + i]) return false;
+      isWeighed_[record.firstWeight + i] = true;
+    }
+    return true;
+  }
+
+  bool isChain(const RigDriver& driver) {
+    if (!isSection(driver.data, driver.count, abi::RIG_PIECE_WORDS)) return false;
+    for (std::size_t i = 0; i < driver.count; ++i) {
+      const auto piece = rig_.at<RigPiece>(driver.data + i * abi::RIG_PIECE_WORDS);
+      if (!isKnown(piece.begin) || !isKnown(piece.end) ||
+          !isSection(piece.joints, piece.jointCount, abi::RIG_CHAIN_JOINT_WORDS))
+        return false;
+    }
+    // None reads what another one drives.
+    for (std::size_t i = 0; i < driver.count; ++i) {
+      const auto piece = rig_.at<RigPiece>(driver.data + i * abi::RIG_PIECE_WORDS);
+      for (std::size_t joint = 0; joint < piece.jointCount; ++joint) {
+        const std::size_t offset = piece.joints + joint * abi::RIG_CHAIN_JOINT_WORDS;
+        if (!areFinite(offset + 1, abi::RIG_CHAIN_JOINT_WORDS - 1) || !drives(rig_.words[offset]))
+          return false;
+      }
+    }
+    return true;
+  }
+
+  bool isLinear(const RigDriver& driver) {
+    if (!isSection(driver.data, 1, abi::RIG_LINEAR_WORDS) ||
+        !isSection(driver.data + abi::RIG_LINEAR_WORDS, driver.count, abi::RIG_TERM_WORDS))
+      return false;
+    for (std::size_t i = 0; i < driver.count; ++i) {
+      const auto term =
+          rig_.at<RigTerm>(driver.data + abi::RIG_LINEAR_WORDS + i * abi::RIG_TERM_WORDS);
+      if (term.weight >= weights() || !isWeighed_[term.weight] || !areFinite(term.matrix))
+        return false;
+    }
+    const auto linear = rig_.at<RigLinear>(driver.data);
+    return isParent(linear.parent) && drives(linear.driven);
+  }
+
+  RigBlob rig_;
+  std::vector<bool> isDriven_, isWeighed_;  ///< so far
+};
+
+}  // namespace
+
+Result<void> checkRig(std::span<const std::uint32_t> words) {
+  if (words.size() < sizeof(RigHeader) / 4 || words[0] != rigMagic)
+    return damagedRig("it does not begin as a rig does");
+  const RigHeader header = RigBlob(words).header;
+  if (header.version != rigVersion) {
+    return Error{ErrorCode::unsupportedVersion,
+                 "packed rig: version " + std::to_string(header.version) +
+                     ", but this library reads version " + std::to_string(rigVersion)};
+  }
+  if (header.wordCount != words.size()) {
+    return damagedRig("it has " + std::to_string(words.size() * 4) +
+                      " bytes, but its header says " +
+                      std::to_string(std::uint64_t{header.wordCount} * 4));
+  }
+  if (checksumOfBlob(words) != header.checksum) return damagedRig("the checksum does not match");
+  if (!RigCheck::isSmall(header)) return damagedRig("its header has counts that are not valid");
+  if (header.mostInputs > header.wordCount)
+    return damagedRig("its header has counts that are not valid");
+  return RigCheck(words).run();
+}
+
+Result<PackedRig> PackedRig::fromBytes(std::span<const std::byte> bytes) {
+  if (bytes.size() % 4 != 0)
+    return damagedRig("it has " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
+  PackedRig rig;
+  rig.words_.resize(bytes.size() / 4);
+  if (!rig.words_.empty()) std::memcpy(rig.words_.data(), bytes.data(), bytes.size());
+  if (Result<void> good = checkRig(rig.words_); !good) return good.error();
+  return rig;
+}
+
+std::uint32_t PackedRig::writtenJoints() const {
+  return RigBlob(*this).header.writtenJoints;
+}
+std::uint32_t PackedRig::drivenJoints() const {
+  return RigBlob(*this).header.drivenJoints;
+}
+std::uint32_t PackedRig::givenWeights() const {
+  return RigBlob(*this).header.givenWeights;
+}
+std::uint32_t PackedRig::drivenWeights() const {
+  return RigBlob(*this).header.drivenWeights;
+}
+std::uint32_t PackedRig::weightsOf() const {
+  return RigBlob(*this).header.weightsOf;
+}
+bool PackedRig::isRigid() const {
+  return RigBlob(*this).header.isRigid != 0;
+}
+float PackedRig::residual() const {
+  return RigBlob(*this).header.residual;
+}
+
+}  // namespace dermis
