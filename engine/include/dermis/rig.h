@@ -85,8 +85,9 @@ struct CorrectiveDriver {
 };
 
 /// Joints that follow a curve through a chain of joints, so that what they move bends smoothly
-/// (Yang et al. 2006; Forstmann and Ohya 2006). The curve passes through the joints of the chain in
-/// the direction that each has, and the twist between two of them is spread along it.
+/// (Yang et al. 2006; Forstmann and Ohya 2006). The curve passes through the joints. At the ends of
+/// the chain it has the directions and the twists of the joints there; at the others the means of
+/// those of the joint and of the one before it. Twist and scale are spread along it.
 ///
 /// The chain is divided into `segments` of equal length in bind pose, measured along the straight
 /// lines between its joints. There is a driven joint at each end of a segment but the ends of the

@@ -32,7 +32,7 @@ static_assert(sizeof(RigHeader) == 64);
 struct RigDriver {
   std::uint32_t kind;
   std::uint32_t data;
-  std::uint32_t count;  ///< chain: pieces; linear: terms
+  std::uint32_t count;  ///< chain: nodes; linear: terms
   std::uint32_t unused;
 };
 static_assert(sizeof(RigDriver) == 4 * abi::RIG_DRIVER_WORDS);
@@ -83,22 +83,21 @@ struct RigOffset {
 };
 static_assert(sizeof(RigOffset) == 4 * abi::RIG_OFFSET_WORDS);
 
-/// Between two joints of a chain.
-struct RigPiece {
-  std::uint32_t begin, end;          ///< joints
+/// A joint of a chain, and the driven joints between it and the next one.
+struct RigNode {
+  std::uint32_t joint;
   std::uint32_t joints, jointCount;  ///< `RigChainJoint`s; their offset
+  std::uint32_t unused;
+  float origin[4], direction[4];  ///< in bind pose: of the joint, and of the curve there
 };
-static_assert(sizeof(RigPiece) == 4 * abi::RIG_PIECE_WORDS);
+static_assert(sizeof(RigNode) == 4 * abi::RIG_NODE_WORDS);
 
-/// The place on the curve is A a + h t + B b + (1 - h) s, where A, B are the matrices of both ends
-/// without translation, and t, s their translations; its direction is A c + B d + g (t - s).
+/// Its place on the curve is h p + (1 - h) q + a s + b t, where p, q are the places of both nodes,
+/// and s, t the directions of the curve there; its direction is g (p - q) + c s + d t.
 struct RigChainJoint {
   std::uint32_t driven;
-  float share;       ///< from the beginning of the piece to its end
-  float weight;      ///< h
-  float slope;       ///< g
-  float a[4], b[4];  ///< the fourth number of b is 1 - h
-  float c[4], d[4];
+  float share;  ///< from one node to the next
+  float h, a, b, g, c, d;
   float point[4], direction[4];  ///< on the curve in bind pose; the direction is of unit length
 };
 static_assert(sizeof(RigChainJoint) == 4 * abi::RIG_CHAIN_JOINT_WORDS);

@@ -16,10 +16,11 @@ namespace dermis {
 using math::Vec3;
 
 HermiteFactors hermiteAt(double t) {
-  return {(1 + 2 * t) * (1 - t) * (1 - t), t * (1 - t) * (1 - t), t * t * (t - 1)};
+  return {(1 + 2 * t) * (1 - t) * (1 - t), t * t * (3 - 2 * t), t * (1 - t) * (1 - t),
+          t * t * (t - 1)};
 }
 HermiteFactors hermiteSlopeAt(double t) {
-  return {6 * t * (t - 1), (1 - t) * (1 - 3 * t), t * (3 * t - 2)};
+  return {6 * t * (t - 1), 6 * t * (1 - t), (1 - t) * (1 - 3 * t), t * (3 * t - 2)};
 }
 
 Result<RestCurve> RestCurve::create(std::span<const RigJoint> joints, const ChainDriver& chain,
@@ -75,11 +76,12 @@ CurvePlace RestCurve::at(double parameter) const {
   return {piece, std::clamp((parameter - beginOf(piece)) / lengthOf(piece), 0.0, 1.0)};
 }
 
-Vec3 RestCurve::point(const CurvePlace& place) const {
-  const HermiteFactors factors = hermiteAt(place.share);
-  return factors.first * origins_[place.piece] + (1 - factors.first) * origins_[place.piece + 1] +
-         factors.firstTangent * tangent(place.piece, place.piece) +
-         factors.secondTangent * tangent(place.piece + 1, place.piece);
+Vec3 RestCurve::combined(const CurvePlace& place, const HermiteFactors& factors) const {
+  const std::size_t begin = place.piece, end = begin + 1;
+  const double length = lengthOf(begin);
+  return factors.first * origins_[begin] + factors.second * origins_[end] +
+         factors.firstTangent * length * directions_[begin] +
+         factors.secondTangent * length * directions_[end];
 }
 
 double RestCurve::squareTo(const Vec3& position, const CurvePlace& place) const {

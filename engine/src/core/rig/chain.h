@@ -17,6 +17,14 @@ struct CurvePlace {
   double share = 0;
 };
 
+/// Factors of a cubic Hermite spline: of its points, and of its tangents there.
+struct HermiteFactors {
+  double first, second, firstTangent, secondTangent;
+};
+HermiteFactors hermiteAt(double share);
+/// Their derivatives.
+HermiteFactors hermiteSlopeAt(double share);
+
 /// Cubic Hermite splines between the joints of a chain. The parameter is the length along the
 /// straight lines between them.
 class RestCurve {
@@ -27,36 +35,30 @@ class RestCurve {
                                   const std::string& subject);
 
   double length() const { return ends_.back(); }
-  std::size_t pieceCount() const { return ends_.size(); }
+  double lengthOf(std::size_t piece) const { return ends_[piece] - beginOf(piece); }
   CurvePlace at(double parameter) const;
   double parameterOf(const CurvePlace& place) const {
     return beginOf(place.piece) + place.share * lengthOf(place.piece);
   }
   math::Vec3 origin(std::size_t joint) const { return origins_[joint]; }
-  /// Of the curve of a piece at its joint: that of a unit of `CurvePlace::share`.
-  math::Vec3 tangent(std::size_t joint, std::size_t piece) const {
-    return lengthOf(piece) * directions_[joint];
+  math::Vec3 direction(std::size_t joint) const { return directions_[joint]; }  ///< of the curve
+  math::Vec3 point(const CurvePlace& place) const {
+    return combined(place, hermiteAt(place.share));
   }
-  math::Vec3 point(const CurvePlace& place) const;
+  /// The derivative by `CurvePlace::share`.
+  math::Vec3 slope(const CurvePlace& place) const {
+    return combined(place, hermiteSlopeAt(place.share));
+  }
   /// The parameter of the point of the curve that is nearest.
   double nearest(const math::Vec3& position) const;
 
  private:
   double beginOf(std::size_t piece) const { return piece == 0 ? 0 : ends_[piece - 1]; }
-  double lengthOf(std::size_t piece) const { return ends_[piece] - beginOf(piece); }
+  math::Vec3 combined(const CurvePlace& place, const HermiteFactors& factors) const;
   double squareTo(const math::Vec3& position, const CurvePlace& place) const;
 
   std::vector<math::Vec3> origins_, directions_;
   std::vector<double> ends_;  ///< parameters of the pieces' ends
 };
-
-/// Of a cubic Hermite spline: the factors of its first point, the first tangent, and the second
-/// tangent. That of the second point is 1 - the first one.
-struct HermiteFactors {
-  double first, firstTangent, secondTangent;
-};
-HermiteFactors hermiteAt(double share);
-/// Their derivatives. That of the second point is -the first one.
-HermiteFactors hermiteSlopeAt(double share);
 
 }  // namespace dermis

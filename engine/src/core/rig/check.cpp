@@ -142,18 +142,22 @@ class RigCheck {
   }
 
   bool isChain(const RigDriver& driver) {
-    if (!isSection(driver.data, driver.count, abi::RIG_PIECE_WORDS)) return false;
+    if (driver.count == 0 || !isSection(driver.data, driver.count, abi::RIG_NODE_WORDS))
+      return false;
+    const auto nodeAt = [&](std::size_t i) {
+      return rig_.at<RigNode>(driver.data + i * abi::RIG_NODE_WORDS);
+    };
     for (std::size_t i = 0; i < driver.count; ++i) {
-      const auto piece = rig_.at<RigPiece>(driver.data + i * abi::RIG_PIECE_WORDS);
-      if (!isKnown(piece.begin) || !isKnown(piece.end) ||
-          !isSection(piece.joints, piece.jointCount, abi::RIG_CHAIN_JOINT_WORDS))
+      const RigNode node = nodeAt(i);
+      if (!isKnown(node.joint) || !areFinite(node.origin) || !areFinite(node.direction) ||
+          !isSection(node.joints, node.jointCount, abi::RIG_CHAIN_JOINT_WORDS))
         return false;
     }
-    // None reads what another one drives.
-    for (std::size_t i = 0; i < driver.count; ++i) {
-      const auto piece = rig_.at<RigPiece>(driver.data + i * abi::RIG_PIECE_WORDS);
-      for (std::size_t joint = 0; joint < piece.jointCount; ++joint) {
-        const std::size_t offset = piece.joints + joint * abi::RIG_CHAIN_JOINT_WORDS;
+    // None reads what another one drives. After the last node there are none.
+    for (std::size_t i = 0; i + 1 < driver.count; ++i) {
+      const RigNode node = nodeAt(i);
+      for (std::size_t joint = 0; joint < node.jointCount; ++joint) {
+        const std::size_t offset = node.joints + joint * abi::RIG_CHAIN_JOINT_WORDS;
         if (!areFinite(offset + 1, abi::RIG_CHAIN_JOINT_WORDS - 1) || !drives(rig_.words[offset]))
           return false;
       }

@@ -329,64 +329,96 @@ void evaluateCorrective(const RigBlob& rig, std::size_t data, std::span<Quat<N>>
   }
 }
 
-/// An end of a piece: its matrix, as rotation × (what is above the diagonal, by rows).
+/// A linear map as rotation × (what is on and above the diagonal, by rows).
 template <typename N>
-struct PieceEnd {
-  Transform<N> matrix;
+struct Frame {
   Quat<N> rotation;
   Vec<N> diagonal, above;  ///< `above`: row 0 columns 1 and 2, row 1 column 2
 };
 
 template <typename N>
-PieceEnd<N> pieceEnd(const Transform<N>& matrix) {
-  const Linear<N> columns = transposed(matrix.linear);
-  const Linear<N> axes = orthonormalColumns(matrix.linear);
-  return {matrix,
-          quaternionOfColumns(axes),
+Frame<N> frameOf(const Linear<N>& m) {
+  const Linear<N> columns = transposed(m), axes = orthonormalColumns(m);
+  return {quaternionOfColumns(axes),
           {dot(axes.r0, columns.r0), dot(axes.r1, columns.r1), dot(axes.r2, columns.r2)},
           {dot(axes.r0, columns.r1), dot(axes.r0, columns.r2), dot(axes.r1, columns.r2)}};
 }
 
 template <typename N>
-Transform<N> onCurve(const RigChainJoint& joint, const PieceEnd<N>& begin, const PieceEnd<N>& end) {
-  const N zero(0.0f), one(1.0f), share(joint.share), rest = one - share;
-  const Linear<N>& a = begin.matrix.linear;
-  const Linear<N>& b = end.matrix.linear;
-  const Vec<N> place = (times(a, vectorFrom<N>(joint.a)) + begin.matrix.shift * N(joint.weight)) +
-                       (times(b, vectorFrom<N>(joint.b)) + end.matrix.shift * N(joint.b[3]));
-  const Vec<N> direction = (times(a, vectorFrom<N>(joint.c)) + times(b, vectorFrom<N>(joint.d))) +
-                           (begin.matrix.shift - end.matrix.shift) * N(joint.slope);
-  const Quat<N>& p = begin.rotation;
-  const Quat<N>& q = end.rotation;
-  const N other = select(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < zero, -share, share);
-  const Quat<N> mixed = unitOrIdentity(Quat<N>{rest * p.x + other * q.x, rest * p.y + other * q.y,
-                                               rest * p.z + other * q.z, rest * p.w + other * q.w});
-  // Then the shortest turn from the direction that this rotation gives to that of the curve.
-  const Vec<N> from = times(rotationOf(mixed), vectorFrom<N>(joint.direction));
-  const Vec<N> to = unitOr(direction, from);
-  const Vec<N> axis = cross(from, to);
-  const Quat<N> swing = unitOrIdentity(Quat<N>{axis.x, axis.y, axis.z, one + dot(from, to)}, 1e-8f);
-  const Linear<N> r = rotationOf(product(swing, mixed));
-  const Vec<N> d = begin.diagonal * rest + end.diagonal * share;
-  const Vec<N> u = begin.above * rest + end.above * share;
+Frame<N> mixed(const Frame<N>& a, const Frame<N>& b, const N& share) {
+  const Quat<N>& p = a.rotation;
+  const Quat<N>& q = b.rotation;
+  const N rest = N(1.0f) - share;
+  const N other = select(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < N(0.0f), -share, share);
+  return {unitOrIdentity(Quat<N>{rest * p.x + other * q.x, rest * p.y + other * q.y,
+                                 rest * p.z + other * q.z, rest * p.w + other * q.w}),
+          a.diagonal * rest + b.diagonal * share, a.above * rest + b.above * share};
+}
+
+template <typename N>
+Linear<N> linearOf(const Quat<N>& rotation, const Frame<N>& frame) {
+  const Linear<N> r = rotationOf(rotation);
+  const Vec<N>& d = frame.diagonal;
+  const Vec<N>& u = frame.above;
   const auto row = [&](const Vec<N>& v) {
     return Vec<N>{v.x * d.x, v.x * u.x + v.y * d.y, v.x * u.y + v.y * u.z + v.z * d.z};
   };
-  const Linear<N> linear{row(r.r0), row(r.r1), row(r.r2)};
+  return {row(r.r0), row(r.r1), row(r.r2)};
+}
+
+/// The curve at a joint of the chain.
+template <typename N>
+struct CurveNode {
+  Frame<N> frame;
+  Vec<N> place, direction;
+};
+
+template <typename N>
+CurveNode<N> nodeAt(const RigNode& node, const Transform<N>& matrix, const Frame<N>& frame) {
+  const Vec<N> origin = vectorFrom<N>(node.origin), direction = vectorFrom<N>(node.direction);
+  return {frame, times(matrix.linear, origin) + matrix.shift,
+          times(linearOf(frame.rotation, frame), direction)};
+}
+
+template <typename N>
+Transform<N> onCurve(const RigChainJoint& joint, const CurveNode<N>& begin,
+                     const CurveNode<N>& end) {
+  const N one(1.0f), h(joint.h);
+  const Vec<N> place = begin.place * h + end.place * (one - h) + begin.direction * N(joint.a) +
+                       end.direction * N(joint.b);
+  const Vec<N> direction = (begin.place - end.place) * N(joint.g) + begin.direction * N(joint.c) +
+                           end.direction * N(joint.d);
+  const Frame<N> frame = mixed(begin.frame, end.frame, N(joint.share));
+  // Then the shortest turn from the direction that this rotation gives to that of the curve.
+  const Vec<N> from = times(rotationOf(frame.rotation), vectorFrom<N>(joint.direction));
+  const Vec<N> to = unitOr(direction, from);
+  const Vec<N> axis = cross(from, to);
+  const Quat<N> swing = unitOrIdentity(Quat<N>{axis.x, axis.y, axis.z, one + dot(from, to)}, 1e-8f);
+  const Linear<N> linear = linearOf(product(swing, frame.rotation), frame);
   return {linear, place - times(linear, vectorFrom<N>(joint.point))};
 }
 
+/// At its ends the curve has the frames of the joints there; at the others the mean of the frames
+/// of the joint and of the one before it, so that a bend is the same on both sides.
 template <typename N, typename Memory>
 void evaluateChain(const RigBlob& rig, const RigDriver& driver, Memory& memory) {
-  for (std::size_t i = 0; i < driver.count; ++i) {
-    const auto piece = rig.at<RigPiece>(driver.data + i * abi::RIG_PIECE_WORDS);
-    if (piece.jointCount == 0) continue;
-    const PieceEnd<N> begin = pieceEnd(memory.joint(piece.begin));
-    const PieceEnd<N> end = pieceEnd(memory.joint(piece.end));
-    for (std::size_t joint = 0; joint < piece.jointCount; ++joint) {
-      const auto record = rig.at<RigChainJoint>(piece.joints + joint * abi::RIG_CHAIN_JOINT_WORDS);
+  auto node = rig.at<RigNode>(driver.data);
+  Transform<N> matrix = memory.joint(node.joint);
+  Frame<N> frame = frameOf(matrix.linear);
+  CurveNode<N> begin = nodeAt(node, matrix, frame);
+  for (std::size_t i = 1; i < driver.count; ++i) {
+    const auto next = rig.at<RigNode>(driver.data + i * abi::RIG_NODE_WORDS);
+    matrix = memory.joint(next.joint);
+    const Frame<N> own = frameOf(matrix.linear);
+    const CurveNode<N> end =
+        nodeAt(next, matrix, i + 1 == driver.count ? own : mixed(frame, own, N(0.5f)));
+    for (std::size_t joint = 0; joint < node.jointCount; ++joint) {
+      const auto record = rig.at<RigChainJoint>(node.joints + joint * abi::RIG_CHAIN_JOINT_WORDS);
       memory.setDriven(record.driven, onCurve(record, begin, end));
     }
+    node = next;
+    frame = own;
+    begin = end;
   }
 }
 

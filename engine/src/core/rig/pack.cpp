@@ -614,41 +614,39 @@ Result<RigDriver> RigPacker::writeCorrective(const CorrectiveDriver& view,
 Result<RigDriver> RigPacker::writeChain(const ChainDriver& chain, const std::string& title) {
   const Result<RestCurve> curve = RestCurve::create(rig_.joints, chain, "packRig: " + title + ": ");
   if (!curve) return curve.error();
-  const std::size_t pieces = curve->pieceCount();
-  const std::uint32_t data = reserve(pieces * abi::RIG_PIECE_WORDS);
-  std::vector<RigPiece> records;
-  for (std::size_t i = 0; i < pieces; ++i)
-    records.push_back({chain.joints[i], chain.joints[i + 1], 0, 0});
+  const std::size_t nodes = chain.joints.size();
+  const std::uint32_t data = reserve(nodes * abi::RIG_NODE_WORDS);
+  std::vector<RigNode> records(nodes);
+  for (std::size_t i = 0; i < nodes; ++i) {
+    records[i].joint = chain.joints[i];
+    records[i].joints = data;
+    dermis::put(records[i].origin, curve->origin(i));
+    dermis::put(records[i].direction, curve->direction(i));
+  }
   for (std::uint32_t end = 1; end < chain.segments; ++end) {
     const CurvePlace place = curve->at(curve->length() * end / chain.segments);
-    RigPiece& piece = records[place.piece];
+    const double length = curve->lengthOf(place.piece);
+    const HermiteFactors at = hermiteAt(place.share), slope = hermiteSlopeAt(place.share);
     RigChainJoint joint{};
     joint.driven = placeOf(chain.firstDriven + end - 1);
     joint.share = static_cast<float>(place.share);
-    const HermiteFactors at = hermiteAt(place.share), slope = hermiteSlopeAt(place.share);
-    joint.weight = static_cast<float>(at.first);
-    joint.slope = static_cast<float>(slope.first);
-    const Vec3 begin = curve->origin(place.piece), last = curve->origin(place.piece + 1);
-    const Vec3 fromBegin = curve->tangent(place.piece, place.piece);
-    const Vec3 fromLast = curve->tangent(place.piece + 1, place.piece);
-    dermis::put(joint.a, at.first * begin + at.firstTangent * fromBegin);
-    dermis::put(joint.b, (1 - at.first) * last + at.secondTangent * fromLast, 1 - at.first);
-    const Vec3 c = slope.first * begin + slope.firstTangent * fromBegin;
-    const Vec3 d = slope.secondTangent * fromLast - slope.first * last;
-    dermis::put(joint.c, c);
-    dermis::put(joint.d, d);
+    joint.h = static_cast<float>(at.first);
+    joint.a = static_cast<float>(at.firstTangent * length);
+    joint.b = static_cast<float>(at.secondTangent * length);
+    joint.g = static_cast<float>(slope.first);
+    joint.c = static_cast<float>(slope.firstTangent * length);
+    joint.d = static_cast<float>(slope.secondTangent * length);
     dermis::put(joint.point, curve->point(place));
-    const double length = math::length(c + d);
-    if (!(length > 0)) return invalid(title + ": the curve stands still between two joints");
-    dermis::put(joint.direction, (c + d) / length);
-    if (piece.jointCount++ == 0) piece.joints = static_cast<std::uint32_t>(words_.size());
+    const Vec3 direction = curve->slope(place);
+    if (!(math::length(direction) > 1e-6 * length))
+      return invalid(title + ": the curve stands still between two joints");
+    dermis::put(joint.direction, direction / math::length(direction));
+    RigNode& node = records[place.piece];
+    if (node.jointCount++ == 0) node.joints = static_cast<std::uint32_t>(words_.size());
     append(joint);
   }
-  for (std::size_t i = 0; i < pieces; ++i) {
-    if (records[i].jointCount == 0) records[i].joints = data;
-    put(data + i * abi::RIG_PIECE_WORDS, records[i]);
-  }
-  return RigDriver{abi::RIG_CHAIN, data, static_cast<std::uint32_t>(pieces), 0};
+  for (std::size_t i = 0; i < nodes; ++i) put(data + i * abi::RIG_NODE_WORDS, records[i]);
+  return RigDriver{abi::RIG_CHAIN, data, static_cast<std::uint32_t>(nodes), 0};
 }
 
 Result<RigDriver> RigPacker::writeLinear(const LinearDriver& view, const std::string& title) {
