@@ -23,7 +23,10 @@ DERMIS_CONSTANT BINDING_MESHES = 1u;  // meshes and clips; palette kernel: the j
 // Palettes, written by the palette kernel and read by the skin kernel. For linear blending in a
 // batch, the joint matrices are bound here instead.
 DERMIS_CONSTANT BINDING_PALETTES = 2u;
-DERMIS_CONSTANT BINDING_WEIGHTS = 2u;    // of the kernel that lists morph targets
+DERMIS_CONSTANT BINDING_WEIGHTS = 2u;  // of the kernel that lists morph targets
+// Palette, rig and morph-list kernels: driven joints, and behind those of a pose its weights.
+DERMIS_CONSTANT BINDING_DRIVEN = 3u;
+DERMIS_CONSTANT BINDING_JOINTS = 2u;     // rig kernel: the joint matrices of poses
 DERMIS_CONSTANT BINDING_POSITIONS = 3u;  // compose kernel: the joint matrices
 DERMIS_CONSTANT MIN_BINDING_COUNT = 4u;
 DERMIS_CONSTANT BINDING_NORMALS = 4u;
@@ -57,7 +60,8 @@ DERMIS_CONSTANT CONSTANT_SCALES = 11u;  // 0 or 1: whether palettes may be two-p
 DERMIS_CONSTANT CONSTANT_FULL = 12u;
 DERMIS_CONSTANT CONSTANT_RECORD = 13u;  // bytes of all attributes, stored together; or RECORD_*
 DERMIS_CONSTANT CONSTANT_RIGID = 14u;   // 0 or 1: whether joints are taken for rigid
-DERMIS_CONSTANT CONSTANT_COUNT = 15u;
+DERMIS_CONSTANT CONSTANT_RIGGED = 15u;  // 0 or 1: whether poses have driven joints
+DERMIS_CONSTANT CONSTANT_COUNT = 16u;
 DERMIS_CONSTANT RECORD_APART = 0u;     // each attribute is stored separately
 DERMIS_CONSTANT RECORD_IN_PAIRS = 1u;  // float32x3 positions and normals, 8 bytes at a time
 
@@ -212,8 +216,14 @@ struct PaletteRecord {
   uint place;
   uint jointCount;
   uint needed;  // 0: nothing is converted, unless the visibility kernel sets it
+  // Only with a rig: the unit of the first driven joint in its buffer, and the number of joints
+  // before it.
+  uint driven;
+  uint writtenJoints;
+  uint reserved0;
+  uint reserved1;
 };
-DERMIS_CONSTANT PALETTE_WORDS = 4u;
+DERMIS_CONSTANT PALETTE_WORDS = 8u;
 DERMIS_CONSTANT PALETTE_NEEDED = 3u;  // the word of `needed`
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
@@ -258,6 +268,23 @@ DERMIS_CONSTANT FIGURE_LAYER_COUNT = 2u;      // the word of `layerCount`
 DERMIS_CONSTANT FIGURE_NEEDED = 0x80000000u;  // also set by the visibility kernel
 DERMIS_CONSTANT LAYER_ADDITIVE = 0x8000u;
 DERMIS_CONSTANT UNITS_OF_TRANSFORM = 3u;  // the rows of a 3×4 matrix
+
+// A pose whose driven joints and weights are computed. Offsets into the buffers of joints count
+// units of 16 bytes.
+struct RigRecord {
+  uint joints;  // the first joint matrix; behind those of the pose, its given weights
+  uint driven;  // the first driven joint; behind them, all weights
+  // Word offset of the FigureRecord that samples the pose and has FIGURE_NEEDED, or RIG_NO_FIGURE.
+  uint figure;
+  uint clips;  // word of the mesh buffer: the bank that the given weights are sampled from
+  // As in a MorphListRecord.
+  uint weights;
+  uint track;
+  uint masks;
+  uint reserved;
+};
+DERMIS_CONSTANT RIG_WORDS = 8u;
+DERMIS_CONSTANT RIG_NO_FIGURE = 0xffffffffu;
 
 // The unit at the beginning of a palette. The same as PoseStatus.
 struct StatusRecord {
@@ -342,8 +369,8 @@ DERMIS_CONSTANT ACTIVE_MORPH_WORDS = 2u;
 // listed. Layers are those of a FigureRecord.
 struct MorphListRecord {
   uint extension;    // word offset of its ExtensionRecord, whose `morphCount` is written
-  uint list;         // word offset of the list, which has room for all targets
-  uint weightCount;  // the number of targets
+  uint list;         // word offset of the list behind those targets that the CPU has listed
+  uint weightCount;  // the number of targets whose weights are read or sampled here
   uint weights;  // word offset of the weights in their buffer, or of those at rest in the meshes
   // The rest only if the weights are sampled. Words of the mesh buffer:
   uint clips;  // the bank, or MORPH_LIST_NO_CLIPS
@@ -358,8 +385,14 @@ struct MorphListRecord {
   uint layer2;
   float time3;
   uint layer3;
+  // Then targets whose weights a rig has.
+  uint listed;       // the number of those that the CPU has listed
+  uint driven;       // the word of the first one's weight in the buffer of driven joints
+  uint firstDriven;  // the first target
+  uint drivenCount;
 };
-DERMIS_CONSTANT MORPH_LIST_WORDS = 16u;
+DERMIS_CONSTANT MORPH_LIST_WORDS = 20u;
+DERMIS_CONSTANT MORPH_LIST_DRIVEN = 16u;  // the word of `listed`
 DERMIS_CONSTANT MORPH_LIST_LAYERS = 8u;  // the word of `time0`
 DERMIS_CONSTANT MORPH_LIST_NO_CLIPS = 0xffffffffu;
 
@@ -449,6 +482,12 @@ struct ComposePush {
   uint figures;
   uint workgroupCount;
   uint band;
+};
+struct RigPush {
+  uint rig;    // word of the mesh buffer
+  uint poses;  // word offset of the records
+  uint poseCount;
+  uint workgroupCount;
 };
 struct MorphListPush {
   uint lists;  // word offset of the records

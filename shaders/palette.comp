@@ -4,7 +4,8 @@
 
 // Converts joint matrices (3×4) to unit dual quaternions and, if poses may scale, to scale and shear parts (the identity for rigid
 // joints). One workgroup converts one palette, so that the status of the whole palette needs no second pass. For linear blending in
-// a scene it copies them: the skin kernel then reads device memory, and not the memory that the CPU writes.
+// a scene it copies them: the skin kernel then reads device memory, and not the memory that the CPU writes. With a rig, the driven
+// joints of a pose are in another buffer.
 //   LOGARITHMS      converts to logarithms of the rigid parts instead of dual quaternions
 
 #include "abi.h"
@@ -19,12 +20,14 @@
 layout(constant_id = CONSTANT_METHOD) const uint METHOD = METHOD_DUAL_QUATERNION;
 layout(constant_id = CONSTANT_SCALES) const bool SCALES = true;
 layout(constant_id = CONSTANT_RIGID) const bool RIGID = false;
+layout(constant_id = CONSTANT_RIGGED) const bool RIGGED = false;
 
 layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
 layout(push_constant) uniform Push { PalettePush push; };
 
-layout(set = 0, binding = BINDING_MESHES, std430) restrict readonly buffer Matrices { uvec4 matrices[]; };
+layout(set = 0, binding = BINDING_MESHES, std430) readonly buffer Matrices { uvec4 matrices[]; };
+layout(set = 0, binding = BINDING_DRIVEN, std430) readonly buffer Driven { uvec4 driven[]; };
 layout(set = 0, binding = BINDING_PALETTES, std430) writeonly buffer Palettes { uvec4 palettes[]; };
 
 shared uint nonRigidJoints;
@@ -75,8 +78,16 @@ void main() {
   if (palette.needed == 0u) return;
   if (METHOD == METHOD_LINEAR) {
     uint units = palette.jointCount * UNITS_OF_MATRIX;
-    for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x)
-      palettes[palette.place + unit] = matrices[palette.matrices + unit];
+    uint writtenUnits = RIGGED ? palette.writtenJoints * UNITS_OF_MATRIX : units;
+    for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x) {
+      uvec4 row;
+      if (unit < writtenUnits || !RIGGED) {
+        row = matrices[palette.matrices + unit];
+      } else {
+        row = driven[palette.driven + unit - writtenUnits];
+      }
+      palettes[palette.place + unit] = row;
+    }
     return;
   }
   if (gl_LocalInvocationID.x == 0u) {
@@ -91,12 +102,18 @@ void main() {
     vec4 r0 = vec4(0.0);
     vec4 r1 = vec4(0.0);
     vec4 r2 = vec4(0.0);
-    uint from = palette.matrices + joint * UNITS_OF_MATRIX;
+    bool isDriven = RIGGED && joint >= palette.writtenJoints;
+    uint from = isDriven ? palette.driven + (joint - palette.writtenJoints) * UNITS_OF_MATRIX
+                         : palette.matrices + joint * UNITS_OF_MATRIX;
     uint end = from + UNITS_OF_MATRIX;
     [[dont_unroll]] do {
       r0 = r1;
       r1 = r2;
-      r2 = uintBitsToFloat(matrices[from]);
+      if (isDriven) {
+        r2 = uintBitsToFloat(driven[from]);
+      } else {
+        r2 = uintBitsToFloat(matrices[from]);
+      }
     } while (++from != end);
 
     vec4 rotation;

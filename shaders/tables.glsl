@@ -22,7 +22,14 @@ uvec4 tableUnit(uint word) { return tableUnits[word / 4u]; }
 
 PaletteRecord loadPalette(uint word) {
   uvec4 a = tableUnit(word);
-  return PaletteRecord(a.x, a.y, a.z, a.w);
+  uvec4 b = tableUnit(word + 4u);
+  return PaletteRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
+}
+
+RigRecord loadRig(uint word) {
+  uvec4 a = tableUnit(word);
+  uvec4 b = tableUnit(word + 4u);
+  return RigRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
 }
 
 GroupRecord loadGroup(uint word) {
@@ -84,7 +91,8 @@ void storeIndirect(uint word, IndirectRecord r) { tableUnits[word / 4u] = uvec4(
 MorphListRecord loadMorphList(uint word) {
   uvec4 a = tableUnit(word);
   uvec4 b = tableUnit(word + 4u);
-  return MorphListRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, 0.0, 0u, 0.0, 0u, 0.0, 0u, 0.0, 0u);
+  uvec4 c = tableUnit(word + MORPH_LIST_DRIVEN);
+  return MorphListRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, 0.0, 0u, 0.0, 0u, 0.0, 0u, 0.0, 0u, c.x, c.y, c.z, c.w);
 }
 
 ActiveMorph loadActiveMorph(uint word) { return ActiveMorph(tables[word], uintBitsToFloat(tables[word + 1u])); }

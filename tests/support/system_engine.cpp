@@ -57,8 +57,7 @@ void SystemEngine::writeWeights(InstanceHandle instance, std::span<const float> 
   gpuWrites_.push_back({{}, instance, {bytes.begin(), bytes.end()}});
 }
 
-std::vector<JointMatrix> SystemEngine::readPose(PoseHandle handle) {
-  const vulkan::BufferRange range = must(recorder_.poseRange(handle));
+std::vector<std::byte> SystemEngine::readRange(const vulkan::BufferRange& range) {
   const samples::MappedBuffer copy = must(
       samples::MappedBuffer::create(device_, range.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   submitNow([&](VkCommandBuffer commandBuffer) {
@@ -67,9 +66,25 @@ std::vector<JointMatrix> SystemEngine::readPose(PoseHandle handle) {
     device_.functions().CmdCopyBuffer(commandBuffer, range.buffer, copy.handle(), 1, &all);
     recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
   });
-  std::vector<JointMatrix> pose(range.size / sizeof(JointMatrix));
-  std::memcpy(pose.data(), copy.bytes().data(), range.size);
+  const std::span<const std::byte> bytes = copy.bytes();
+  return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(range.size)};
+}
+
+std::vector<JointMatrix> SystemEngine::readPose(PoseHandle handle) {
+  const std::vector<std::byte> bytes = readRange(must(recorder_.poseRange(handle)));
+  std::vector<JointMatrix> pose(bytes.size() / sizeof(JointMatrix));
+  std::memcpy(pose.data(), bytes.data(), bytes.size());
   return pose;
+}
+
+Driven SystemEngine::readDriven(PoseHandle handle) {
+  const std::vector<std::byte> bytes = readRange(must(recorder_.drivenRange(handle)));
+  constexpr std::size_t joints = drivenJoints * sizeof(JointMatrix);
+  Driven driven{std::vector<JointMatrix>(drivenJoints),
+                std::vector<float>((bytes.size() - joints) / sizeof(float))};
+  std::memcpy(driven.joints.data(), bytes.data(), joints);
+  std::memcpy(driven.weights.data(), bytes.data() + joints, bytes.size() - joints);
+  return driven;
 }
 
 void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {

@@ -18,6 +18,7 @@
 #include "dermis/vulkan/scene_recorder.h"
 #include "kit/buffer.h"
 #include "kit/device.h"
+#include "rigged.h"
 #include "scene_meshes.h"
 
 namespace dermis::test {
@@ -83,6 +84,8 @@ class SystemEngine {
 
   /// A pose that the GPU writes, or that belongs to a figure.
   std::vector<JointMatrix> readPose(PoseHandle pose);
+  /// What the rig of a pose drives.
+  Driven readDriven(PoseHandle pose);
   /// Submits what `record` records, and waits for it and all before.
   void submitNow(const std::function<void(VkCommandBuffer)>& record);
   void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Barrier& barrier) const;
@@ -105,6 +108,7 @@ class SystemEngine {
   static std::pair<std::uint32_t, std::uint32_t> key(MeshHandle mesh) {
     return {mesh.index, mesh.generation};
   }
+  std::vector<std::byte> readRange(const vulkan::BufferRange& range);
   void writeGpuPoses(VkCommandBuffer commandBuffer);
   VkCommandBuffer beginCommands();
   Result<void> recordInSecondary(VkCommandBuffer primary, const vulkan::FrameDescription& frame);

@@ -187,7 +187,9 @@ struct PipelineNeeds {
   bool bounds = false;       ///< `Job::bounds`
   bool culledOnGpu = false;  ///< `InstanceDescription::culledOnGpu`
   bool figures = false;      ///< whether poses belong to figures (`Scene::addFigure`)
-  bool morphsOnGpu = false;  ///< whether morph weights have a `MorphWriter` other than the CPU
+  /// Whether morph weights have a `MorphWriter` other than the CPU, or are driven.
+  bool morphsOnGpu = false;
+  bool rigs = false;  ///< whether poses have rigs (`PoseOptions::rig`)
   // -- Optional. Each of these reduces the number of pipelines. Instances that differ from it are
   // then not prepared.
   /// What is true of all meshes: `maxInfluences` is the maximum, `minInfluences` the minimum, and
@@ -197,8 +199,9 @@ struct PipelineNeeds {
 };
 
 /// All pipelines for instances with these needs, at any offset that `placeVertices` accepts. With
-/// `culledOnGpu` also the visibility kernel, with `figures` the two that sample clips, and with
-/// `morphsOnGpu` the one that lists morph targets. Fails as `placeVertices` does, and with
+/// `culledOnGpu` also the visibility kernel, with `figures` the two that sample clips, with
+/// `morphsOnGpu` the one that lists morph targets, and with `rigs` the one that computes what rigs
+/// drive, and palette kernels for poses with driven joints. Fails as `placeVertices` does, and with
 /// `invalidArgument` if the layout breaks a rule of `OutputAttribute`, or if the method, the limits
 /// or the tuning are not valid.
 DERMIS_CORE_API Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs,
@@ -220,7 +223,7 @@ enum class BufferRole : std::uint8_t {
   tangents = 7,           ///< skinned tangents
   previousPositions = 8,  ///< positions of the previous frame
   // Only in a scene (scene.h).
-  gpuPoses = 9,   ///< joint matrices that a GPU pass of the engine writes
+  gpuPoses = 9,   ///< joint matrices that the GPU writes
   readBack = 10,  ///< what the CPU reads of a complete frame; copied from history and results
   /// A word for each instance, not 0 if it is visible. The engine's culling writes it.
   visibility = 11,

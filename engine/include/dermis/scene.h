@@ -29,6 +29,7 @@
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 
 namespace dermis {
 
@@ -49,6 +50,7 @@ using PoseHandle = Handle<struct PoseOfSystem>;          ///< a pose
 using InstanceHandle = Handle<struct InstanceOfSystem>;  ///< an instance
 using ClipsHandle = Handle<struct ClipsOfSystem>;        ///< a bank of clips
 using FigureHandle = Handle<struct FigureOfSystem>;      ///< what plays clips
+using RigHandle = Handle<struct RigOfSystem>;            ///< a rig
 
 /// How much a buffer holds. It grows if something is added that does not fit.
 struct Capacity {
@@ -64,14 +66,15 @@ struct SceneDescription {
   /// Frames whose fence the engine has not yet waited for when it calls `beginFrame`, the new one
   /// included. At least 1. Ignored by `cpu::SceneRunner`.
   std::uint32_t framesInFlight = 2;
-  /// Bytes of packed meshes and, unless the CPU executes the frames, of clips; at most a storage
-  /// buffer range.
+  /// Bytes of packed meshes and, unless the CPU executes the frames, of clips and rigs; at most a
+  /// storage buffer range.
   Capacity meshCapacity{64 << 10};
   /// Joints of all poses that the CPU writes. All poses that one call adds are in one buffer, so
   /// some joints of a buffer may stay unused.
   Capacity jointCapacity{256};
-  /// The same for poses that the GPU writes. Poses of figures are among them, unless the CPU
-  /// executes the frames, and morph weights that the GPU writes: 12 take the room of a joint.
+  /// The same for poses that the GPU writes. Poses of figures and joints that rigs drive are among
+  /// them, unless the CPU executes the frames, and weights that the GPU writes: 12 take the room of
+  /// a joint.
   Capacity gpuJointCapacity{0};
   /// Bytes of skinned vertices: the sum of `VertexPlaces::size` and of the gaps for alignment. May
   /// be more than a storage buffer range. Initial and maximum are rounded to multiples of 4.
@@ -88,7 +91,11 @@ struct PoseOptions {
   /// frame. If true: a GPU pass of the engine, always to the same memory; the engine then calls
   /// `markWritten`.
   bool writtenByGpu = false;
-  JointPromise promise = JointPromise::scaling;  ///< as `PoseDescription::promise`
+  /// As `PoseDescription::promise`. That of a pose with a rig includes driven joints: they keep
+  /// that of the others if `PackedRig::isRigid`.
+  JointPromise promise = JointPromise::scaling;
+  /// Computes the joints after the written ones. None if it is null.
+  RigHandle rig = {};
 };
 
 /// What a figure plays from now on.
@@ -146,8 +153,14 @@ struct InstanceDescription {
   /// Other than the CPU needs a mesh with morph targets.
   MorphWriter morphWriter = MorphWriter::cpu;
   /// With `MorphWriter::clips`: the node of the skeleton whose weights drive the instance. The bank
-  /// must have as many for it as the mesh has targets (`PackedClips::weightCount`).
+  /// must have as many for it as the mesh has targets that no rig drives
+  /// (`PackedClips::weightCount`).
   std::uint32_t weightsOf = 0xffffffffu;
+  /// The number of the mesh's last morph targets whose weights are those of the rig of the pose,
+  /// consecutive from `firstDrivenWeight` on. They are not active while the pose has no rig.
+  /// `morphWriter` writes the targets before them.
+  std::uint32_t drivenTargets = 0;
+  std::uint32_t firstDrivenWeight = 0;
 };
 
 /// What changes about an instance: every member that has a value. If the mesh, pose, method or box
@@ -293,10 +306,17 @@ class DERMIS_CORE_API Scene {
   /// Fails with `invalidArgument` if an instance uses the mesh.
   Result<void> removeMesh(MeshHandle mesh);
 
+  /// Adds a rig, for any number of poses. The scene keeps its bytes. Fails with `limitExceeded` if
+  /// there is no room on the GPU.
+  Result<RigHandle> addRig(PackedRig rig);
+  /// Fails with `invalidArgument` if a pose has the rig.
+  Result<void> removeRig(RigHandle rig);
+
   /// Adds a pose. All its joint matrices are identities until `writePose`; those of a pose that the
   /// GPU writes are undefined until a pass of the engine writes them. Fails with `invalidArgument`
-  /// if `jointCount` is not from 1 to `maxPoseJoints`, or if the GPU writes the pose of a scene on
-  /// the CPU, and with `limitExceeded` if there is no room.
+  /// if `jointCount` is not from 1 to `maxPoseJoints`, or not that of the written joints of the
+  /// rig, or if the GPU writes the pose of a scene on the CPU, and with `limitExceeded` if there is
+  /// no room. Behind the joints of a pose that the GPU writes are the given weights of its rig.
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
   /// writes are consecutive in one buffer: each begins `jointCount` matrices after the one before
@@ -313,8 +333,11 @@ class DERMIS_CORE_API Scene {
   /// Fails with `invalidArgument` if a figure uses the bank.
   Result<void> removeClips(ClipsHandle clips);
   /// Adds a figure, which plays clips of one bank. It has a pose for each skin of the bank, which
-  /// the scene samples. It rests until `play`. Fails with `limitExceeded` if there is no room.
-  Result<FigureHandle> addFigure(ClipsHandle clips);
+  /// the scene samples. It rests until `play`. `rigs` is empty, or has a rig or a null handle for
+  /// each skin. Fails with `limitExceeded` if there is no room, and with `invalidArgument` if a rig
+  /// does not have the joints of its skin, or takes other weights than the clips have for
+  /// `RigView::weightsOf`.
+  Result<FigureHandle> addFigure(ClipsHandle clips, std::span<const RigHandle> rigs = {});
   /// Removes a figure and its poses. Fails with `invalidArgument` if an instance uses one of them.
   Result<void> removeFigure(FigureHandle figure);
   /// The pose of a figure for a skin of its bank. It has the promise `JointPromise::rigid` if the
@@ -356,6 +379,9 @@ class DERMIS_CORE_API Scene {
   /// returns memory, too: for the first frame. Fails with `invalidArgument` between the execution
   /// of a frame and the next `beginFrame`, and for a pose that the GPU writes.
   Result<std::span<JointMatrix>> writePose(PoseHandle pose);
+  /// The same for the given weights of the pose's rig: `writePose` and this one return memory of
+  /// the same pose, and the engine writes both.
+  Result<std::span<float>> writePoseWeights(PoseHandle pose);
   /// States that a GPU pass of the engine writes these poses before the commands of this frame. All
   /// their instances are skinned again. There is one copy of such a pose: an instance that is
   /// skinned later uses what the memory holds then. If the frame is abandoned, the engine writes
@@ -557,9 +583,13 @@ class DERMIS_CORE_API SceneCommands {
   /// for a pose that the CPU writes.
   Result<BufferPart> posePart(PoseHandle pose) const;
   /// Where the morph weights of an instance are that a GPU pass of the engine writes: a float for
-  /// each target of its mesh. The place stays the same until the instance is removed. Fails with
-  /// `invalidArgument` for an instance whose weights the CPU writes.
+  /// each target of its mesh that no rig drives. The place stays the same until the instance is
+  /// removed. Fails with `invalidArgument` for an instance whose weights the CPU writes.
   Result<BufferPart> weightsPart(InstanceHandle instance) const;
+  /// Where the joints are that the rig of a pose drives, and behind them all its weights, a float
+  /// each; of a pose that was needed. The place stays the same until the pose is removed. Fails
+  /// with `invalidArgument` for a pose without a rig.
+  Result<BufferPart> drivenPart(PoseHandle pose) const;
 
  private:
   SceneCommands();

@@ -56,6 +56,9 @@ static_assert(sizeof(abi::BankRecord) == abi::BANK_WORDS * 4 && abi::BANK_WORDS 
 static_assert(sizeof(abi::BandRecord) == abi::BAND_WORDS * 4 && abi::BAND_WORDS == 4);
 static_assert(sizeof(abi::StepRecord) == abi::STEP_WORDS * 4 && abi::STEP_WORDS == 4);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
+static_assert(sizeof(abi::RigRecord) == abi::RIG_WORDS * 4 && abi::RIG_WORDS % 4 == 0);
+static_assert(sizeof(abi::MorphListRecord) == abi::MORPH_LIST_WORDS * 4 &&
+              abi::MORPH_LIST_WORDS % 4 == 0);
 // Public structures have the layout of the records that kernels write and read.
 static_assert(sizeof(InstanceResult) == sizeof(abi::ResultRecord) &&
               offsetof(InstanceResult, clampedVertices) ==
@@ -96,6 +99,7 @@ std::vector<std::uint32_t> constantsOf(const Variant& variant) {
   set(abi::CONSTANT_BOUNDS, variant.bounds);
   set(abi::CONSTANT_SCALES, variant.scales);
   set(abi::CONSTANT_RIGID, variant.rigid);
+  set(abi::CONSTANT_RIGGED, variant.rigged);
   set(abi::CONSTANT_FULL, variant.fullInfluences);
   set(abi::CONSTANT_RECORD, variant.pairs ? abi::RECORD_IN_PAIRS : variant.recordBytes);
   return constants;
@@ -110,6 +114,7 @@ std::string moduleName(const Variant& variant) {
   if (variant.kernel == Kernel::clear) return "clear";
   if (variant.kernel == Kernel::visibility) return "visibility";
   if (variant.kernel == Kernel::morphLists) return "morph_lists";
+  if (variant.kernel == Kernel::rig) return variant.texels ? "rig_texels" : "rig";
   if (variant.kernel == Kernel::sample) return variant.texels ? "sample_texels" : "sample";
   if (variant.kernel == Kernel::compose) return variant.texels ? "compose_texels" : "compose";
   std::string name = "skin";
@@ -130,10 +135,12 @@ std::string pipelineName(const Variant& variant) {
                                                   : "dual quaternions") +
            (variant.scales  ? " with joints that scale"
             : variant.rigid ? " of rigid joints"
-                            : "");
+                            : "") +
+           (variant.rigged ? " and driven joints" : "");
   }
   if (variant.kernel == Kernel::clear) return "clear kernel";
   if (variant.kernel == Kernel::morphLists) return "kernel that lists morph targets";
+  if (variant.kernel == Kernel::rig) return "kernel that computes what rigs drive";
   if (variant.kernel == Kernel::sample) return "kernel that samples clips";
   if (variant.kernel == Kernel::compose) return "kernel that composes poses";
   if (variant.kernel == Kernel::visibility)

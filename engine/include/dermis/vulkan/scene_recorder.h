@@ -216,10 +216,15 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// frame: as they were last sampled. Fails with `invalidArgument` for a pose that the CPU writes.
   Result<BufferRange> poseRange(PoseHandle pose) const;
   /// The same for the morph weights of an instance (`MorphWriter::gpu`): a float for each target of
-  /// its mesh, in ascending order. The engine calls `Scene::markMorphsWritten`. The range stays the
-  /// same until the instance is removed; its offset is a multiple of 16. Fails with
-  /// `invalidArgument` for an instance whose weights the CPU writes.
+  /// its mesh that no rig drives, in ascending order. The engine calls `Scene::markMorphsWritten`.
+  /// The range stays the same until the instance is removed; its offset is a multiple of 16. Fails
+  /// with `invalidArgument` for an instance whose weights the CPU writes.
   Result<BufferRange> weightsRange(InstanceHandle instance) const;
+  /// Where the joints are that the rig of a pose drives, and behind them all its weights, a float
+  /// each. The engine only reads them, after the commands of a frame: as they were when the pose
+  /// was last needed. The range stays the same until the pose is removed. Fails with
+  /// `invalidArgument` for a pose without a rig.
+  Result<BufferRange> drivenRange(PoseHandle pose) const;
 
   /// Of the last frame that was recorded.
   RecorderStatistics statistics() const;

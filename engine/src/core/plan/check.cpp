@@ -202,7 +202,7 @@ Result<void> checkPrevious(const VertexPlaces& places, const Subject& subject) {
 
 Result<void> checkVariant(const Variant& variant) {
   constexpr Subject subject{"the variant"};
-  if (variant.kernel > Kernel::morphLists)
+  if (variant.kernel > Kernel::rig)
     return notAValue("the variant: its kernel", variant.kernel, "Kernel");
   if (Result<void> good = checkMethod(variant.method, subject); !good) return good;
   if (Result<void> good =

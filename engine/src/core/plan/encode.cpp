@@ -63,8 +63,10 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
   plan.sizes = sizes;
   dispatches_.clear();
   lists_.clear();
+  drivenLists_.clear();
   if (work.isEmpty()) return {};
   if (Result<void> good = addFigureDispatches(); !good) return good;
+  if (Result<void> good = addRigDispatches(); !good) return good;
   if (Result<void> good = addPaletteDispatches(); !good) return good;
   if (Result<void> good = addClearDispatch(); !good) return good;
   if (Result<void> good = addDispatches(); !good) return good;
@@ -79,8 +81,9 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
     return tooLargeForRange("tables", plan.tables.size() * 4, limits);
   plan.instanceCount = static_cast<std::uint32_t>(work.instances.size());
   // Commands point into the list, so it must not move.
-  plan.bindings.reserve((dispatches_.size() + lists_.size() + visibility_.size()) *
-                        (abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT));
+  plan.bindings.reserve(
+      (dispatches_.size() + lists_.size() + drivenLists_.size() + visibility_.size()) *
+      (abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT));
   return {};
 }
 
@@ -149,7 +152,7 @@ Result<void> Encoder::addFigureDispatches() {
     }
     count += records.size();
   }
-  if (Result<void> good = addDispatch(figureVariant(Kernel::sample, limits_, tuning_), count,
+  if (Result<void> good = addDispatch(poseVariant(Kernel::sample, limits_, tuning_), count,
                                       abi::SamplePush{figures, 0});
       !good)
     return good;
@@ -158,7 +161,7 @@ Result<void> Encoder::addFigureDispatches() {
     for (std::uint32_t buffer = 0; buffer < work_->figures.size(); ++buffer) {
       const std::size_t here = work_->figures[buffer].size();
       if (here == 0) continue;
-      if (Result<void> good = addDispatch(figureVariant(Kernel::compose, limits_, tuning_), here,
+      if (Result<void> good = addDispatch(poseVariant(Kernel::compose, limits_, tuning_), here,
                                           abi::ComposePush{first, 0, band});
           !good)
         return good;
@@ -173,19 +176,49 @@ Result<void> Encoder::addFigureDispatches() {
   return {};
 }
 
+/// One invocation per pose, a dispatch for each rig and each pair of buffers. They wait for each
+/// other, since each reads and writes driven joints.
+Result<void> Encoder::addRigDispatches() {
+  std::vector<std::uint32_t>& tables = plan_->tables;
+  for (const Work::Rig& rig : work_->rigs) {
+    const std::uint32_t first = wordsOf(tables);
+    for (std::size_t i = 0; i < rig.poses.size(); ++i) {
+      abi::RigRecord record = rig.poses[i];
+      record.figure = abi::RIG_NO_FIGURE;
+      if (rig.figures[i] != notUsed) {
+        const auto& [buffer, place] = work_->figurePlaces[rig.figures[i]];
+        record.figure = figureWords_[buffer] + place * abi::FIGURE_WORDS;
+      }
+      tables.resize(tables.size() + abi::RIG_WORDS);
+      store(tables, tables.size() - abi::RIG_WORDS, record);
+    }
+    const auto count = static_cast<std::uint32_t>(rig.poses.size());
+    if (Result<void> good = addDispatch(poseVariant(Kernel::rig, limits_, tuning_),
+                                        divideUp(count, tuning_.workgroupSize),
+                                        abi::RigPush{rig.words, first, count, 0});
+        !good)
+      return good;
+    Dispatch& dispatch = dispatches_.back();
+    dispatch.stage = paletteStage_++;
+    dispatch.joints = rig.joints;
+    dispatch.poseBuffer = rig.buffer;
+    dispatch.drivenBuffer = rig.drivenBuffer;
+  }
+  return {};
+}
+
 Result<void> Encoder::addPaletteDispatches() {
   paletteWords_.clear();
-  for (std::uint32_t buffer = 0; buffer < work_->poses.size(); ++buffer) {
-    const Work::Poses& lists = work_->poses[buffer];
+  for (const Work::Poses& lists : work_->poses) {
     for (std::size_t form = 0; form < paletteFormCount; ++form) {
       for (std::size_t promise = 0; promise < jointPromiseCount; ++promise) {
         const std::span<const abi::PaletteRecord> records = lists.records[form][promise];
         paletteWords_.push_back(wordsOf(plan_->tables));
         if (records.empty()) continue;
-        const Variant variant = paletteVariant(
-            static_cast<PaletteForm>(form), static_cast<JointPromise>(promise), limits_, tuning_);
-        if (Result<void> good = addPaletteDispatch(variant, records, lists.joints, buffer); !good)
-          return good;
+        const Variant variant =
+            paletteVariant(static_cast<PaletteForm>(form), static_cast<JointPromise>(promise),
+                           lists.drivenBuffer != notUsed, limits_, tuning_);
+        if (Result<void> good = addPaletteDispatch(variant, records, lists); !good) return good;
       }
     }
   }
@@ -195,7 +228,7 @@ Result<void> Encoder::addPaletteDispatches() {
 /// One workgroup per palette.
 Result<void> Encoder::addPaletteDispatch(const Variant& variant,
                                          std::span<const abi::PaletteRecord> records,
-                                         BufferRole joints, std::uint32_t buffer) {
+                                         const Work::Poses& poses) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::uint32_t first = wordsOf(tables);
   tables.resize(first + records.size() * abi::PALETTE_WORDS);
@@ -203,8 +236,9 @@ Result<void> Encoder::addPaletteDispatch(const Variant& variant,
   if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0}); !good)
     return good;
   dispatches_.back().stage = paletteStage_;
-  dispatches_.back().joints = joints;
-  dispatches_.back().poseBuffer = buffer;
+  dispatches_.back().joints = poses.joints;
+  dispatches_.back().poseBuffer = poses.buffer;
+  dispatches_.back().drivenBuffer = poses.drivenBuffer;
   return {};
 }
 
@@ -330,7 +364,8 @@ std::uint32_t Encoder::appendExtension(const InstanceExtras& extras) {
   extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
   for (const MorphWeight& morph : extras.morphs)
     tables.insert(tables.end(), {morph.target, std::bit_cast<std::uint32_t>(morph.weight)});
-  tables.resize(tables.size() + std::size_t{extras.writtenMorphs} * abi::ACTIVE_MORPH_WORDS);
+  tables.resize(tables.size() + (std::size_t{extras.writtenMorphs} + extras.drivenMorphs) *
+                                    abi::ACTIVE_MORPH_WORDS);
   if (extras.result != notUsed) extension.result = extras.result;
   if (extras.hasBox) setBox(extension, extras.box);
   store(tables, place, extension);
@@ -367,29 +402,29 @@ void Encoder::writeInstances() {
     if (list != work_->morphLists.end() && list->instance == number) {
       abi::MorphListRecord& made = listRecords_.emplace_back((list++)->record);
       made.extension = extension;
-      made.list = extension + abi::EXTENSION_WORDS;
-      made.weightCount = instance.extras->writtenMorphs;
+      made.listed = static_cast<std::uint32_t>(instance.extras->morphs.size());
+      made.list = extension + abi::EXTENSION_WORDS + made.listed * abi::ACTIVE_MORPH_WORDS;
     }
   }
   culled_.instances = firstRecord;
   markEvenlySpaced(firstRecord);
 }
 
-/// One invocation for each list; a dispatch for each buffer that has weights, and one for those
-/// that are sampled.
+/// One invocation for each list; a dispatch for those whose weights are in the same buffers.
 Result<void> Encoder::addMorphLists() {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const std::span<const Work::MorphList> lists = work_->morphLists;
-  std::vector<std::uint32_t>& buffers = listBuffers_;
-  buffers.clear();
-  for (const Work::MorphList& list : lists) {
-    if (std::ranges::find(buffers, list.buffer) == buffers.end()) buffers.push_back(list.buffer);
-  }
-  for (const std::uint32_t buffer : buffers) {
+  const auto shareDispatch = [](const Work::MorphList& a, const Work::MorphList& b) {
+    return a.buffer == b.buffer && a.drivenBuffer == b.drivenBuffer;
+  };
+  for (std::size_t begin = 0; begin < lists.size(); ++begin) {
+    const Work::MorphList& head = lists[begin];
+    const auto isLike = [&](const Work::MorphList& list) { return shareDispatch(list, head); };
+    if (std::ranges::any_of(lists.first(begin), isLike)) continue;
     alignToUnit(tables);
     const std::uint32_t first = wordsOf(tables);
-    for (std::size_t i = 0; i < lists.size(); ++i) {
-      if (lists[i].buffer != buffer) continue;
+    for (std::size_t i = begin; i < lists.size(); ++i) {
+      if (!isLike(lists[i])) continue;
       tables.resize(tables.size() + abi::MORPH_LIST_WORDS);
       store(tables, tables.size() - abi::MORPH_LIST_WORDS, listRecords_[i]);
     }
@@ -399,11 +434,14 @@ Result<void> Encoder::addMorphLists() {
                                         abi::MorphListPush{first, count, 0});
         !good)
       return good;
-    lists_.push_back(dispatches_.back());
+    Dispatch dispatch = dispatches_.back();
     dispatches_.pop_back();
-    if (buffer == notUsed) continue;
-    lists_.back().joints = BufferRole::gpuPoses;
-    lists_.back().poseBuffer = buffer;
+    if (head.buffer != notUsed) {
+      dispatch.joints = BufferRole::gpuPoses;
+      dispatch.poseBuffer = head.buffer;
+    }
+    dispatch.drivenBuffer = head.drivenBuffer;
+    (head.drivenBuffer == notUsed ? lists_ : drivenLists_).push_back(dispatch);
   }
   return {};
 }
@@ -572,6 +610,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   const BufferPart& joints = readsPoses && !buffers.poses.empty()
                                  ? buffers.poses[dispatch.poseBuffer]
                                  : buffers[dispatch.joints];
+  const BufferPart driven =
+      dispatch.drivenBuffer != notUsed ? buffers.poses[dispatch.drivenBuffer] : BufferPart();
   parts[abi::BINDING_TABLES] = tables;
   if (variant.kernel == Kernel::visibility) {
     parts[abi::BINDING_VISIBILITY] = buffers[BufferRole::visibility];
@@ -602,6 +642,11 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   } else if (variant.kernel == Kernel::morphLists) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_WEIGHTS] = readsPoses ? joints : buffers[BufferRole::meshes];
+    parts[abi::BINDING_DRIVEN] = orElse(driven, buffers[BufferRole::meshes]);
+  } else if (variant.kernel == Kernel::rig) {
+    parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
+    parts[abi::BINDING_JOINTS] = joints;
+    parts[abi::BINDING_DRIVEN] = driven;
   } else if (variant.kernel == Kernel::sample || variant.kernel == Kernel::compose) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = buffers[BufferRole::palettes];
@@ -611,6 +656,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     parts[abi::BINDING_MESHES] =
         variant.kernel == Kernel::palette ? orElse(joints, tables) : tables;
     parts[abi::BINDING_PALETTES] = orElse(palettes, results);
+    if (variant.kernel == Kernel::palette)
+      parts[abi::BINDING_DRIVEN] = orElse(driven, parts[abi::BINDING_MESHES]);
     parts[abi::BINDING_RESULTS] = orElse(results, palettes);
   }
   const std::uint32_t count = limits_.maxStorageBuffersPerStage < storageBuffersWanted
@@ -627,8 +674,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     };
     texels(abi::BINDING_TABLE_TEXELS, tables);
     texels(abi::BINDING_MESH_TEXELS, buffers[BufferRole::meshes]);
-    const bool writesPoses = variant.kernel == Kernel::compose;
-    texels(abi::BINDING_PALETTE_TEXELS, writesPoses ? buffers[BufferRole::palettes] : joints);
+    const bool isOfScene = variant.kernel == Kernel::compose || variant.kernel == Kernel::rig;
+    texels(abi::BINDING_PALETTE_TEXELS, isOfScene ? buffers[BufferRole::palettes] : joints);
   }
   auto& command = std::get<DispatchCommand>(
       plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));
@@ -638,8 +685,19 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
 }
 
 void Encoder::listDispatches(const PlanBuffers& buffers) {
+  constexpr Use any = Use::computeRead | Use::computeWrite | Use::indirectRead;
   std::uint32_t stage = 0;
+  bool isListed = drivenLists_.empty();
   for (const Dispatch& dispatch : dispatches_) {
+    if (!isListed && dispatch.stage >= paletteStage_) {  // rigs are done
+      isListed = true;
+      for (const Dispatch& list : drivenLists_) {
+        plan_->commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
+        listDispatch(list, buffers);
+      }
+      plan_->commands.emplace_back(BarrierCommand{Use::computeWrite, any});
+      stage = dispatch.stage;
+    }
     if (dispatch.stage > stage) {
       plan_->commands.emplace_back(BarrierCommand{Use::computeWrite, computeBoth});
       stage = dispatch.stage;

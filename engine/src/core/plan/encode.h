@@ -43,16 +43,18 @@ class Encoder {
     /// It reads what dispatches of lower stages write. Results are cleared in stage 0.
     std::uint32_t stage = 0;
     BufferRole joints = BufferRole::palettes;  ///< that the kernel reads
-    std::uint32_t poseBuffer = 0;              ///< of the palette and compose kernels of a scene
+    std::uint32_t poseBuffer = 0;              ///< of kernels of a scene that read or write poses
+    std::uint32_t drivenBuffer = notUsed;      ///< the same of driven joints and weights
     ByStream<std::uint32_t> windows{};
     std::uint32_t instancesPerInvocation = 0;  ///< at most; of a skin kernel
   };
 
   Result<void> addFigureDispatches();
+  Result<void> addRigDispatches();
   Result<void> addPaletteDispatches();
   Result<void> addPaletteDispatch(const Variant& variant,
-                                  std::span<const abi::PaletteRecord> records, BufferRole joints,
-                                  std::uint32_t buffer);
+                                  std::span<const abi::PaletteRecord> records,
+                                  const Work::Poses& poses);
   Result<void> addClearDispatch();
   std::uint64_t vertexGroupsOf(const Group& group) const;
   void chooseVerticesPerInvocation(std::span<const std::uint32_t> groups);
@@ -84,8 +86,9 @@ class Encoder {
   std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
   /// Of each of `Work::morphLists`.
   std::vector<abi::MorphListRecord> listRecords_;
-  std::vector<std::uint32_t> listBuffers_;
-  std::vector<Dispatch> lists_;  ///< they write tables, before all others
+  /// They write tables: those without driven weights before all other dispatches, those with them
+  /// after the rigs.
+  std::vector<Dispatch> lists_, drivenLists_;
   std::vector<Dispatch> dispatches_;
   std::array<Dispatch, 2> visibility_;  ///< the passes of the visibility kernel
   abi::VisibilityPush culled_{};        ///< push constants of the visibility kernel

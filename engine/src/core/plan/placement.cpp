@@ -213,20 +213,21 @@ Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tunin
   return variant;
 }
 
-Variant figureVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning) {
+Variant poseVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = variantOf(kernel, limits, tuning);
   variant.texels = storesWidely(limits);
   return variant;
 }
 
-Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
-                       const Tuning& tuning) {
+Variant paletteVariant(PaletteForm form, JointPromise promise, bool rigged,
+                       const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = variantOf(Kernel::palette, limits, tuning);
   variant.method = form == PaletteForm::matrices     ? Method::linear
                    : form == PaletteForm::logarithms ? Method::logMatrix
                                                      : Method::dualQuaternion;
   variant.scales = promise == JointPromise::scaling && form != PaletteForm::matrices;
   variant.rigid = promise == JointPromise::rigid && form != PaletteForm::matrices;
+  variant.rigged = rigged;
   return variant;
 }
 
@@ -256,7 +257,7 @@ std::vector<Variant> earlierVariants(const Job& job, const FormRanges& ranges,
   const PaletteForm form = paletteForm(job.method);
   for (const JointPromise promise : ranges.promises) {
     if (form != PaletteForm::matrices)
-      variants.push_back(paletteVariant(form, promise, limits, tuning));
+      variants.push_back(paletteVariant(form, promise, false, limits, tuning));
   }
   if (hasResult(job)) variants.push_back(variantOf(Kernel::clear, limits, tuning));
   return variants;
@@ -311,13 +312,21 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   job.places = *places;
   const FormRanges ranges(needs.mesh, needs.promise);
   std::vector<Variant> variants = earlierVariants(job, ranges, limits, tuning);
-  if (needs.method == Method::linear)  // a scene copies them
-    variants.push_back(
-        paletteVariant(PaletteForm::matrices, JointPromise::scaling, limits, tuning));
+  const PaletteForm form = paletteForm(job.method);
+  const bool isCopied = form == PaletteForm::matrices;  // in a scene
+  if (isCopied)
+    variants.push_back(paletteVariant(form, JointPromise::scaling, false, limits, tuning));
+  if (needs.rigs) {
+    variants.push_back(poseVariant(Kernel::rig, limits, tuning));
+    for (const JointPromise promise : ranges.promises) {
+      const Variant rigged = paletteVariant(form, promise, true, limits, tuning);
+      if (std::ranges::find(variants, rigged) == variants.end()) variants.push_back(rigged);
+    }
+  }
   // `placeVertices` aligns what it places.
   appendForms(layoutVariant(job, limits, tuning), ranges, variants);
   for (const Kernel kernel : {Kernel::sample, Kernel::compose}) {
-    if (needs.figures) variants.push_back(figureVariant(kernel, limits, tuning));
+    if (needs.figures) variants.push_back(poseVariant(kernel, limits, tuning));
   }
   if (needs.morphsOnGpu) variants.push_back(variantOf(Kernel::morphLists, limits, tuning));
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));

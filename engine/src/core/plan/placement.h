@@ -78,12 +78,12 @@ inline PaletteForm paletteForm(Method method) {
 }
 
 /// Matrices are copied, whether they scale or not.
-Variant paletteVariant(PaletteForm form, JointPromise promise, const DeviceLimits& limits,
-                       const Tuning& tuning);
+Variant paletteVariant(PaletteForm form, JointPromise promise, bool rigged,
+                       const DeviceLimits& limits, const Tuning& tuning);
 /// The clear kernel, the visibility kernel, or the one that lists morph targets.
 Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
-/// Of the kernels that sample clips.
-Variant figureVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
+/// Of the kernels that sample clips, and of those that compute what rigs drive.
+Variant poseVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning);
 
 /// The skin kernel for a job, except for the members that `chooseForm` sets. It depends on nothing
 /// else in the batch.

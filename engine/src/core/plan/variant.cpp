@@ -17,6 +17,7 @@ void visitFields(AnyVariant& variant, const Field& field) {
   field(variant.texels, 1);
   field(variant.scales, 1);
   field(variant.rigid, 1);
+  field(variant.rigged, 1);
   field(variant.bounds, 1);
   field(variant.morphs, 1);
   field(variant.motion, 1);

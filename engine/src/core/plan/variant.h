@@ -22,14 +22,15 @@ enum class Kernel : std::uint8_t {
   sample = 4,      ///< in a scene: samples the local transforms of figures from clips
   compose = 5,     ///< in a scene: makes the poses of figures from these
   morphLists = 6,  ///< in a scene: lists the active morph targets of weights that the GPU writes
+  rig = 7,         ///< in a scene: computes what rigs drive
 };
 
 /// One specialization of a kernel, from which one pipeline is built.
 ///
 /// `kernel`, `workgroupSize` and `oneOutput` apply to all kernels. The palette kernel also has
 /// `method`, which is what joints are converted to (dualQuaternion: dual quaternions, logMatrix:
-/// logarithms, linear: unchanged matrices), `scales`, and `rigid`, which only it has. All other
-/// members apply to the skin kernel only.
+/// logarithms, linear: unchanged matrices), `scales`, and `rigid` and `rigged`, which only it has.
+/// All other members apply to the skin kernel only.
 struct Variant {
   Kernel kernel = Kernel::skin;
   Method method = Method::dualQuaternion;
@@ -47,6 +48,8 @@ struct Variant {
   bool scales = false;
   /// Whether joints are taken for rigid (`JointPromise::rigid`).
   bool rigid = false;
+  /// Whether poses have driven joints.
+  bool rigged = false;
   /// Whether tables, meshes and palettes are read through uniform texel buffers, not storage
   /// buffers.
   bool texels = false;

@@ -27,6 +27,7 @@ void Work::begin(Groups& groupsInUse) {
     }
   }
   banks.clear();
+  rigs.clear();
   for (std::vector<abi::FigureRecord>& records : figures) records.clear();
   figurePlaces.clear();
   poseCount = 0;
@@ -51,6 +52,23 @@ void Work::addFigure(std::uint32_t poseBuffer, const Bank& bank, abi::FigureReco
   while (figures.size() <= poseBuffer) figures.emplace_back();
   figurePlaces.push_back({poseBuffer, static_cast<std::uint32_t>(figures[poseBuffer].size())});
   figures[poseBuffer].push_back(record);
+}
+
+void Work::addRig(std::uint32_t words, const PoseSource& source, const abi::RigRecord& record,
+                  std::uint32_t figure) {
+  const auto isOf = [&](const Rig& rig) {
+    return rig.words == words && rig.buffer == source.buffer &&
+           rig.drivenBuffer == source.drivenBuffer;
+  };
+  // Mostly that of the pose before.
+  auto rig =
+      !rigs.empty() && isOf(rigs.back()) ? std::prev(rigs.end()) : std::ranges::find_if(rigs, isOf);
+  if (rig == rigs.end()) {
+    rigs.push_back({words, source.buffer, source.drivenBuffer, source.role, {}, {}});
+    rig = std::prev(rigs.end());
+  }
+  rig->poses.push_back(record);
+  rig->figures.push_back(figure);
 }
 
 void Work::startGroup(Groups::Entry& entry) {

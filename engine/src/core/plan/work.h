@@ -27,16 +27,24 @@ inline std::uint64_t paletteSize(PaletteForm form, std::uint32_t jointCount, Joi
                  (joint + (promise == JointPromise::scaling ? abi::UNITS_OF_SCALE_SHEAR : 0));
 }
 
+/// The joints whose memory has room for so many 32-bit words.
+inline std::uint32_t jointsFor(std::uint64_t words) {
+  constexpr std::uint64_t each = sizeof(JointMatrix) / sizeof(float);
+  return static_cast<std::uint32_t>((words + each - 1) / each);
+}
+
 /// What only some instances have.
 struct InstanceExtras {
   std::vector<MorphWeight> morphs;  ///< in ascending order, without weights of 0
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
-  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are made on the GPU
+  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are made on the GPU …
+  std::uint32_t drivenMorphs = 0;   ///< … and those after them that a rig drives
 
   bool isNeeded() const {
-    return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0;
+    return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0 ||
+           drivenMorphs != 0;
   }
 };
 
@@ -46,14 +54,14 @@ void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>&
 
 /// Where a palette that is converted is in the work.
 struct PalettePlace {
-  std::uint32_t buffer = 0;
+  std::uint32_t buffers = 0;  ///< index into `Work::poses`
   PaletteForm form = PaletteForm::dualQuaternions;
   JointPromise promise = JointPromise::scaling;
   std::uint32_t index = notUsed;  ///< in the list of these
 
   /// The number of the list.
   std::size_t list() const {
-    return (buffer * paletteFormCount + static_cast<std::size_t>(form)) * jointPromiseCount +
+    return (buffers * paletteFormCount + static_cast<std::size_t>(form)) * jointPromiseCount +
            static_cast<std::size_t>(promise);
   }
 };
@@ -68,17 +76,21 @@ struct Candidate {
   PalettePlace palette = {};
 };
 
-/// The joint matrices that are converted to a palette.
+/// The joint matrices that are converted to a palette. Of those that a rig drives, which come last:
+/// their buffer and first unit, and the number of the others.
 struct PoseSource {
   std::uint32_t unit = 0;  ///< of the first
   std::uint32_t buffer = 0;
   BufferRole role = BufferRole::poses;
+  std::uint32_t drivenBuffer = notUsed, drivenUnit = 0, writtenJoints = 0;
 };
 
 /// Call `begin`, add palettes and instances in any order, then `arrange`.
 struct Work {
-  /// Poses of one pose buffer, by form and promise.
+  /// Poses of one pose buffer, by form and promise; with a rig, those whose driven joints are in
+  /// one buffer.
   struct Poses {
+    std::uint32_t buffer = 0, drivenBuffer = notUsed;
     BufferRole joints = BufferRole::poses;
     std::array<std::array<std::vector<abi::PaletteRecord>, jointPromiseCount>, paletteFormCount>
         records;
@@ -96,11 +108,21 @@ struct Work {
     std::uint32_t palette;         ///< the unit where it begins
     std::uint32_t flags;           ///< abi::INSTANCE_RESTARTS and the like
   };
-  /// Active morph targets that the GPU lists: of an instance with `InstanceExtras::writtenMorphs`.
+  /// Poses of one rig whose joints are in one buffer, and driven joints in another.
+  struct Rig {
+    std::uint32_t words;  ///< where the rig is in the mesh buffer
+    std::uint32_t buffer, drivenBuffer;
+    BufferRole joints;
+    std::vector<abi::RigRecord> poses;   ///< but for `figure`
+    std::vector<std::uint32_t> figures;  ///< for each: by the order of figures, or `notUsed`
+  };
+  /// Active morph targets that the GPU lists: of an instance with `InstanceExtras::writtenMorphs`
+  /// or `drivenMorphs`.
   struct MorphList {
     std::uint32_t instance;       ///< index into `instances`
     std::uint32_t buffer;         ///< of poses, that has the weights; `notUsed`: they are sampled
-    abi::MorphListRecord record;  ///< but for `extension`, `list` and `weightCount`
+    std::uint32_t drivenBuffer;   ///< that has driven weights, or `notUsed`
+    abi::MorphListRecord record;  ///< but for `extension`, `list`, `listed` and counts
   };
   struct Culled {
     std::uint32_t instance;  ///< index into `instances`
@@ -113,7 +135,8 @@ struct Work {
   std::vector<std::vector<abi::FigureRecord>> figures;
   /// Of each figure, in the order in which they were added: pose buffer, and place in its list.
   std::vector<std::array<std::uint32_t, 2>> figurePlaces;
-  std::vector<Poses> poses;  ///< by pose buffer
+  std::vector<Poses> poses;
+  std::vector<Rig> rigs;
   std::uint32_t poseCount = 0;
   std::vector<std::uint32_t> clearedResults;  ///< the numbers of results to be cleared
   std::vector<Instance> instances;            ///< in the order in which they were added
@@ -125,20 +148,24 @@ struct Work {
   std::vector<std::uint32_t> order;
 
   void addFigure(std::uint32_t poseBuffer, const Bank& bank, abi::FigureRecord record);
+  /// `figure`: of the pose, by the order in which figures are added, or `notUsed`.
+  void addRig(std::uint32_t words, const PoseSource& source, const abi::RigRecord& record,
+              std::uint32_t figure);
   void begin(Groups& groupsInUse);
   bool isEmpty() const { return poseCount == 0 && clearedResults.empty() && instances.empty(); }
 
   /// A batch has only pose buffer 0. If it is not needed, the GPU decides whether it is.
   PalettePlace addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
                        PaletteForm form, JointPromise promise, bool isNeeded = true) {
-    while (poses.size() <= source.buffer) poses.emplace_back();
-    Poses& lists = poses[source.buffer];
+    const std::uint32_t buffers = buffersOf(source);
+    Poses& lists = poses[buffers];
     lists.joints = source.role;
     std::vector<abi::PaletteRecord>& records =
         lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)];
-    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
+    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u, source.drivenUnit,
+                       source.writtenJoints, 0, 0});
     ++poseCount;
-    return {source.buffer, form, promise, static_cast<std::uint32_t>(records.size() - 1)};
+    return {buffers, form, promise, static_cast<std::uint32_t>(records.size() - 1)};
   }
   /// What it points to must stay valid while the work is read.
   void add(const Instance& instance) {
@@ -163,6 +190,17 @@ struct Work {
 
  private:
   void startGroup(Groups::Entry& entry);
+  /// The index of its list in `poses`, mostly the first.
+  std::uint32_t buffersOf(const PoseSource& source) {
+    for (std::uint32_t index = 0; index < poses.size(); ++index) {
+      if (poses[index].buffer == source.buffer && poses[index].drivenBuffer == source.drivenBuffer)
+        return index;
+    }
+    Poses& added = poses.emplace_back();
+    added.buffer = source.buffer;
+    added.drivenBuffer = source.drivenBuffer;
+    return static_cast<std::uint32_t>(poses.size() - 1);
+  }
 
   Groups* groups_ = nullptr;
   std::uint64_t number_ = 0;  ///< of the work, among those of this object

@@ -17,6 +17,7 @@
 #include "dermis/clips.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 #include "dermis/scene.h"
 #include "plan/encode.h"
 #include "plan/work.h"
@@ -96,15 +97,24 @@ struct ScenePose {
     std::uint32_t unit = notUsed;  ///< the first of its palette
     std::uint64_t version = 0;     ///< of the pose; 0 if it is to be converted again
     std::uint64_t plannedIn = 0;   ///< the plan that converts it …
-    std::uint32_t place = 0;       ///< … and its place in the list of such palettes
+    PalettePlace place;            ///< … and its place among the palettes of the work
   };
 
-  std::uint32_t jointCount = 0;
+  std::uint32_t jointCount = 0;     ///< of all, and …
+  std::uint32_t writtenJoints = 0;  ///< … without those that a rig drives
+  std::uint32_t slotJoints = 0;     ///< of a slot: these, and room for given weights
   JointPromise promise = JointPromise::scaling;
   bool writtenByGpu = false;
   std::uint32_t figure = notUsed;  ///< to which it belongs
   std::uint32_t buffer = 0;        ///< its number
   Range joints;                    ///< in that buffer, of all slots together
+  std::uint32_t rig = notUsed;     ///< index
+  /// Where the driven joints are, and behind them all weights. On the CPU a copy of the others
+  /// comes before them.
+  Range driven;
+  std::uint32_t drivenBuffer = 0;
+  std::uint64_t drivenVersion = 0;  ///< of the pose, that is there; 0: it is computed again
+  std::uint64_t drivenPlan = 0;     ///< the plan that computes it
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
   /// flight.
   std::uint32_t slot = 0;
@@ -132,6 +142,12 @@ struct SceneClips {
   std::uint64_t deviceOffset() const {
     return bytes.offset + (content->bank.bytes().size() + unitBytes - 1) / unitBytes * unitBytes;
   }
+};
+
+struct SceneRig {
+  std::unique_ptr<const PackedRig> rig;  ///< its address stays the same
+  Range bytes;                           ///< in the mesh buffer
+  std::uint32_t users = 0;
 };
 
 struct SceneFigure {
@@ -207,11 +223,12 @@ struct SceneInstance {
   PoseHandle poseHandle;
   bool bounds = false;
   MorphWriter morphWriter = MorphWriter::cpu;
-  std::uint32_t weightsOf = notUsed;  ///< node of a skeleton
-  std::uint32_t weightsBuffer = 0;    ///< of poses, that has the weights which the GPU writes …
-  Range weights;                      ///< … and where they are there, in joints
-  bool isWritten = false;             ///< `InstanceOutput::isWritten`
-  std::optional<Place> shown;         ///< where it was last recorded
+  std::uint32_t weightsOf = notUsed;                       ///< node of a skeleton
+  std::uint32_t drivenTargets = 0, firstDrivenWeight = 0;  ///< as in its description
+  std::uint32_t weightsBuffer = 0;  ///< of poses, that has the weights which the GPU writes …
+  Range weights;                    ///< … and where they are there, in joints
+  bool isWritten = false;           ///< `InstanceOutput::isWritten`
+  std::optional<Place> shown;       ///< where it was last recorded
 
   const Place& place() const { return shown ? *shown : target; }
 };
@@ -249,6 +266,8 @@ struct SceneBooks {
     std::vector<JointMatrix> staged;  ///< what the CPU writes where the buffer is not mapped
   };
 
+  Result<void> checkDrivenTargets(const SceneInstance& instance, const ScenePose& pose,
+                                  std::uint32_t targets) const;
   Result<void> checkMorphWriter(const SceneInstance& instance, const ScenePose& pose,
                                 std::uint32_t targets) const;
   Result<void> check(const SceneInstance& instance, std::uint32_t updateInterval) const;
@@ -304,20 +323,31 @@ struct SceneBooks {
   void dropPose(PoseHandle handle);
   /// Where the matrices of the current slot are in the buffer of the pose.
   std::uint64_t offsetOf(const ScenePose& pose) const {
-    return (pose.joints.offset + std::uint64_t{pose.slot} * pose.jointCount) * sizeof(JointMatrix);
+    return (pose.joints.offset + std::uint64_t{pose.slot} * pose.slotJoints) * sizeof(JointMatrix);
   }
   /// Fails for a pose that the CPU writes.
   DERMIS_CORE_API Result<BufferPart> posePart(PoseHandle pose) const;
   /// Fails for an instance whose morph weights the CPU writes.
   DERMIS_CORE_API Result<BufferPart> weightsPart(InstanceHandle instance) const;
-  /// The memory that the CPU writes.
+  /// Fails for a pose without a rig.
+  DERMIS_CORE_API Result<BufferPart> drivenPart(PoseHandle pose) const;
+  /// The memory that the CPU writes: joints, and room for given weights.
   DERMIS_CORE_API std::span<JointMatrix> matricesOf(const ScenePose& pose);
-  /// The same of all poses of a figure; those of a scene on the CPU.
+  /// Of a scene on the CPU: the memory of what a rig drives.
+  DERMIS_CORE_API std::span<JointMatrix> drivenOf(const ScenePose& pose);
+  /// The joints of all poses of a figure; of a scene on the CPU.
   DERMIS_CORE_API std::span<JointMatrix> matricesOf(const SceneFigure& figure);
   void upload(PoseHandle pose) {
     if (poseBuffers_[poses_.at(pose.index).buffer].buffer.mapped == nullptr)
       poseUploads_.push_back(pose);
   }
+
+  // rigs.cpp
+  Result<void> takeDriven(ScenePose& pose, std::uint32_t rig);
+  void releaseDriven(const ScenePose& pose);
+  void driveRig(std::uint32_t pose, std::uint32_t figure);
+  std::uint64_t drivenWord(const ScenePose& pose, std::uint32_t weight) const;
+  std::uint32_t drivenTargetsOf(const SceneInstance& instance) const;
 
   // figures.cpp
   void sampleFigure(std::uint32_t index, bool isNeeded);
@@ -418,6 +448,7 @@ struct SceneBooks {
   SlotMap<SceneInstance, InstanceHandle> instances_;
   SlotMap<SceneClips, ClipsHandle> clips_;
   SlotMap<SceneFigure, FigureHandle> figures_;
+  SlotMap<SceneRig, RigHandle> rigs_;
   std::vector<InstanceState> states_;  ///< of each instance, by index
   Store meshStore_, unitStore_, outputStore_, resultStore_;
   GrowingBuffer history_;
@@ -438,6 +469,7 @@ struct SceneBooks {
   std::vector<MeshUpload> uploadedMeshes_;  ///< … and of the last, as long as it may be abandoned
   std::vector<PoseHandle> poseUploads_, uploadedPoses_;   ///< the same
   std::vector<ClipsHandle> clipUploads_, uploadedClips_;  ///< the same
+  std::vector<RigHandle> rigUploads_, uploadedRigs_;      ///< the same
 
   std::uint64_t frame_ = 0, completed_ = 0;
   std::uint64_t record_ = 0;         ///< the last that was committed
@@ -479,6 +511,7 @@ struct SceneBooks {
   };
   std::vector<Conversion> conversions_;
   std::vector<std::uint32_t> sampling_;  ///< figures
+  std::vector<std::uint32_t> driving_;   ///< poses whose rigs are computed
   std::vector<CopyCommand> moves_;
   std::vector<std::uint32_t> plannedResults_;  ///< their numbers, in no order
   std::vector<std::uint64_t> resultMarks_;     ///< scratch: a bit for each of them

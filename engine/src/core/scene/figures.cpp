@@ -48,13 +48,40 @@ Result<void> Scene::removeClips(ClipsHandle handle) {
   return {};
 }
 
-Result<FigureHandle> Scene::addFigure(ClipsHandle handle) {
+namespace {
+
+/// Whether a rig fits a skin of a bank.
+Result<void> checkRigOf(const PackedRig& rig, const PackedClips& bank, std::uint32_t skin) {
+  if (rig.writtenJoints() != bank.jointCount(skin)) {
+    return invalid("the rig of skin " + std::to_string(skin) + " has " +
+                   std::to_string(rig.writtenJoints()) + " written joints, but the skin has " +
+                   std::to_string(bank.jointCount(skin)));
+  }
+  if (rig.givenWeights() == 0 || bank.weightCount(rig.weightsOf()) == rig.givenWeights()) return {};
+  return invalid("the rig of skin " + std::to_string(skin) + " takes " +
+                 std::to_string(rig.givenWeights()) + " weights, but the clips have " +
+                 std::to_string(bank.weightCount(rig.weightsOf())) + " of its node");
+}
+
+}  // namespace
+
+Result<FigureHandle> Scene::addFigure(ClipsHandle handle, std::span<const RigHandle> rigs) {
   SceneBooks& books = changed();
   SceneClips* const clips = books.clips_.find(handle);
   if (clips == nullptr) return unknownHandle("clips", handle);
   const SceneClips::Content& content = *clips->content;
   const PackedClips& bank = content.bank;
   const bool onGpu = !books.owner_.isCpu;
+  if (!rigs.empty() && rigs.size() != bank.skinCount()) {
+    return invalid("there are " + std::to_string(rigs.size()) + " rigs for " +
+                   std::to_string(bank.skinCount()) + " skins");
+  }
+  for (std::uint32_t skin = 0; skin < rigs.size(); ++skin) {
+    if (!rigs[skin]) continue;
+    const SceneRig* rig = books.rigs_.find(rigs[skin]);
+    if (rig == nullptr) return unknownHandle("rig", rigs[skin]);
+    if (Result<void> good = checkRigOf(*rig->rig, bank, skin); !good) return good.error();
+  }
   std::uint64_t joints = 0;
   for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) joints += bank.jointCount(skin);
   SceneFigure figure;
@@ -81,11 +108,25 @@ Result<FigureHandle> Scene::addFigure(ClipsHandle handle) {
   pose.buffer = figure.buffer;
   pose.joints = {figure.joints.offset, 0};
   for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
-    pose.jointCount = bank.jointCount(skin);
-    pose.promise = content.isRigid[skin] ? JointPromise::rigid : JointPromise::scaling;
-    pose.joints.size = pose.jointCount;
+    pose.jointCount = pose.writtenJoints = pose.slotJoints = bank.jointCount(skin);
+    bool isRigid = content.isRigid[skin];
+    pose.rig = notUsed;
+    if (!rigs.empty() && rigs[skin]) {
+      const PackedRig& rig = *books.rigs_.at(rigs[skin].index).rig;
+      pose.jointCount += rig.drivenJoints();
+      pose.rig = rigs[skin].index;
+      isRigid = isRigid && rig.isRigid();
+    }
+    if (Result<void> taken = books.takeDriven(pose, pose.rig); !taken) {
+      for (const PoseHandle added : figure.poses) books.dropPose(added);
+      books.retire(books.poseBuffers_[figure.buffer].joints, figure.joints);
+      if (figure.matrices.size != 0) books.retire(books.unitStore_.ranges, figure.matrices);
+      return taken.error();
+    }
+    pose.promise = isRigid ? JointPromise::rigid : JointPromise::scaling;
+    pose.joints.size = pose.writtenJoints;
     figure.poses.push_back(books.poses_.add(pose));
-    pose.joints.offset += pose.jointCount;
+    pose.joints.offset += pose.writtenJoints;
   }
   ++clips->users;
   const FigureHandle added = books.figures_.add(std::move(figure));
@@ -175,22 +216,24 @@ void SceneBooks::sampleMorphs(SceneInstance& instance) {
 
 /// For the GPU: what lists the active targets of the last of the work's instances.
 void SceneBooks::listMorphs(const SceneInstance& instance) {
-  Work::MorphList list{static_cast<std::uint32_t>(work_.instances.size() - 1), notUsed, {}};
+  Work::MorphList list{
+      static_cast<std::uint32_t>(work_.instances.size() - 1), notUsed, notUsed, {}};
+  const std::uint32_t drivenCount = drivenTargetsOf(instance);
+  const std::optional<BankMorphed> node = findMorphed(instance);
+  list.record.clips = abi::MORPH_LIST_NO_CLIPS;
   if (instance.morphWriter == MorphWriter::gpu) {
     list.buffer = instance.weightsBuffer;
-    list.record.clips = abi::MORPH_LIST_NO_CLIPS;
     list.record.weights =
         static_cast<std::uint32_t>(instance.weights.offset * sizeof(JointMatrix) / sizeof(float));
-  } else {
-    const std::optional<BankMorphed> node = findMorphed(instance);
-    if (!node) return;
+    list.record.weightCount = instance.extras.writtenMorphs;
+  } else if (node) {
     const SceneFigure& figure = figures_.at(poses_.at(instance.pose).figure);
     const SceneClips& clips = clips_.at(figure.clips.index);
     const auto& layers = figure.layers.layers;
     const auto bank = static_cast<std::uint32_t>(clips.bytes.offset / 4);
     list.record = {.extension = 0,
                    .list = 0,
-                   .weightCount = 0,
+                   .weightCount = instance.extras.writtenMorphs,
                    .weights = bank + node->rest,
                    .clips = bank,
                    .track = 3 * ClipBank(clips.content->bank).header.nodeCount + node->firstGroup,
@@ -203,7 +246,20 @@ void SceneBooks::listMorphs(const SceneInstance& instance) {
                    .time2 = layers[2].time,
                    .layer2 = layers[2].bits,
                    .time3 = layers[3].time,
-                   .layer3 = layers[3].bits};
+                   .layer3 = layers[3].bits,
+                   .listed = 0,
+                   .driven = 0,
+                   .firstDriven = 0,
+                   .drivenCount = 0};
+  } else if (drivenCount == 0) {
+    return;
+  }
+  if (drivenCount != 0) {
+    const ScenePose& pose = poses_.at(instance.pose);
+    list.drivenBuffer = pose.drivenBuffer;
+    list.record.driven = static_cast<std::uint32_t>(drivenWord(pose, instance.firstDrivenWeight));
+    list.record.firstDriven = meshes_.at(instance.mesh.index).info.morphTargetCount - drivenCount;
+    list.record.drivenCount = drivenCount;
   }
   work_.morphLists.push_back(list);
 }
@@ -222,6 +278,9 @@ void SceneBooks::sampleFigure(std::uint32_t index, bool isNeeded) {
   figure.plannedIn = planNumber_;
   figure.place = static_cast<std::uint32_t>(sampling_.size());
   sampling_.push_back(index);
+  for (const PoseHandle pose : figure.poses) {
+    if (poses_.at(pose.index).rig != notUsed) driveRig(pose.index, figure.place);
+  }
 }
 
 /// For kernels.

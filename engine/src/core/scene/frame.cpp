@@ -63,12 +63,21 @@ void SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
   const bool isNeeded = !isCulled || pose.figure == notUsed;
-  if (pose.figure != notUsed) sampleFigure(pose.figure, isNeeded);
+  if (pose.figure != notUsed) {
+    sampleFigure(pose.figure, isNeeded);
+  } else if (pose.rig != notUsed && pose.drivenVersion != pose.version) {
+    driveRig(instance.pose, notUsed);
+  }
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form), isNeeded});
-  const PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
-                          pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
+  PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
+                    pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
+  if (pose.rig != notUsed) {
+    source.drivenBuffer = pose.drivenBuffer;
+    source.drivenUnit = static_cast<std::uint32_t>(pose.driven.offset) * abi::UNITS_OF_MATRIX;
+    source.writtenJoints = pose.writtenJoints;
+  }
   converted.place =
-      work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise, isNeeded).index;
+      work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise, isNeeded);
 }
 
 void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
@@ -83,7 +92,8 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
       work_.add(skinned);
     }
     const bool isSkinned = (flags & abi::INSTANCE_SETTLES) == 0;
-    if (isSkinned && instance.extras.writtenMorphs != 0) listMorphs(instance);
+    if (isSkinned && instance.extras.writtenMorphs + instance.extras.drivenMorphs != 0)
+      listMorphs(instance);
   };
   add(instance.run);
   for (const PlacedRun& run : instance.furtherRuns) add(run);
@@ -183,7 +193,7 @@ void SceneBooks::gatherCulled() {
     const PaletteForm form = paletteForm(instance.method);
     const ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
     if (pose.figure != notUsed && converted.plannedIn == planNumber_) {
-      candidate.palette = {pose.buffer, form, pose.promise, converted.place};
+      candidate.palette = converted.place;
       const SceneFigure& figure = figures_.at(pose.figure);
       if (figure.plannedIn == planNumber_) candidate.figure = figure.place;
     }
@@ -249,6 +259,7 @@ Result<void> SceneBooks::gather() {
   versioned_.clear();
   conversions_.clear();
   sampling_.clear();
+  driving_.clear();
   moves_.clear();
   plannedResults_.clear();
   resultCopies_.clear();
@@ -265,7 +276,7 @@ Result<void> SceneBooks::gather() {
   work_.arrange();
   for (const Conversion& conversion : conversions_) {
     const ScenePose& pose = poses_.at(conversion.pose.index);
-    if (!pose.writtenByGpu) planned_.poseBytes += pose.jointCount * sizeof(JointMatrix);
+    if (!pose.writtenByGpu) planned_.poseBytes += pose.slotJoints * sizeof(JointMatrix);
   }
   planned_.frame = frame_;
   planned_.instances = instances_.size();
@@ -301,6 +312,12 @@ void SceneBooks::listUploads() {
     const std::uint32_t meshes = meshStore_.buffer.now.number;
     uploads_.push_back({{meshes, clips->bytes.offset, bank.size()}, bank});
     if (!words.empty()) uploads_.push_back({{meshes, clips->deviceOffset(), words.size()}, words});
+  }
+  for (const RigHandle handle : rigUploads_) {
+    const SceneRig* rig = rigs_.find(handle);
+    if (rig == nullptr) continue;
+    uploads_.push_back({{meshStore_.buffer.now.number, rig->bytes.offset, rig->rig->bytes().size()},
+                        rig->rig->bytes()});
   }
   for (const PoseHandle handle : poseUploads_) {
     ScenePose* pose = poses_.find(handle);
@@ -396,6 +413,8 @@ Result<void> SceneBooks::commit() {
   poseUploads_.clear();
   uploadedClips_.swap(clipUploads_);
   clipUploads_.clear();
+  uploadedRigs_.swap(rigUploads_);
+  rigUploads_.clear();
   skinned_.clear();
   settled_.clear();
   moving_.swap(held_);
@@ -407,6 +426,10 @@ Result<void> SceneBooks::commit() {
   for (const std::uint32_t index : sampling_) {
     SceneFigure& figure = figures_.at(index);
     if (figure.isNeeded) figure.sampled = figure.version;
+  }
+  for (const std::uint32_t index : driving_) {
+    ScenePose& pose = poses_.at(index);
+    pose.drivenVersion = pose.version;
   }
   for (const auto& [index, restarts] : due_) {
     InstanceState& state = states_[index];
@@ -469,6 +492,7 @@ void SceneBooks::abandon() {
   }
   for (std::uint32_t index = 0; index < poses_.capacity(); ++index) {
     for (ScenePose::Form& form : poses_.at(index).forms) form.version = 0;
+    poses_.at(index).drivenVersion = 0;
   }
   for (std::uint32_t index = 0; index < figures_.capacity(); ++index)
     figures_.at(index).sampled = 0;
@@ -488,6 +512,8 @@ void SceneBooks::abandon() {
   uploadedPoses_.clear();
   clipUploads_.insert(clipUploads_.end(), uploadedClips_.begin(), uploadedClips_.end());
   uploadedClips_.clear();
+  rigUploads_.insert(rigUploads_.end(), uploadedRigs_.begin(), uploadedRigs_.end());
+  uploadedRigs_.clear();
   skinned_.clear();
   settled_.clear();
   committed_ = {};
@@ -524,6 +550,7 @@ void SceneBooks::begin(std::uint64_t frame, std::uint64_t completedFrame) {
   uploadedMeshes_.clear();
   uploadedPoses_.clear();
   uploadedClips_.clear();
+  uploadedRigs_.clear();
   for (GrowingBuffer* buffer : keptBuffers())
     retire(std::exchange(buffer->copied, SceneBufferMemory()));
   frame_ = frame;

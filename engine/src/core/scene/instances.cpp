@@ -38,11 +38,34 @@ Job jobOf(const SceneInstance& instance, const SceneMesh& mesh, const VertexPlac
   job.morphs = instance.extras.morphs;
   // Nobody knows how many are active.
   static constexpr MorphWeight one{0, 1};
-  if (instance.morphWriter != MorphWriter::cpu) job.morphs = {&one, 1};
+  if (instance.morphWriter != MorphWriter::cpu || instance.drivenTargets != 0)
+    job.morphs = {&one, 1};
   return job;
 }
 
+/// Targets whose weights no rig drives.
+std::uint32_t writtenTargets(const SceneInstance& instance, const SceneMesh& mesh) {
+  return mesh.info.morphTargetCount - std::min(instance.drivenTargets, mesh.info.morphTargetCount);
+}
+
 }  // namespace
+
+/// `targets`: of the mesh.
+Result<void> SceneBooks::checkDrivenTargets(const SceneInstance& instance, const ScenePose& pose,
+                                            std::uint32_t targets) const {
+  const std::uint64_t count = instance.drivenTargets;
+  if (count > targets) {
+    return invalid("the instance has " + std::to_string(count) +
+                   " driven targets, but its mesh has " + std::to_string(targets) + " targets");
+  }
+  if (count == 0 || pose.rig == notUsed) return {};
+  const PackedRig& rig = *rigs_.at(pose.rig).rig;
+  const std::uint64_t weights = std::uint64_t{rig.givenWeights()} + rig.drivenWeights();
+  if (instance.firstDrivenWeight + count <= weights) return {};
+  return invalid("the instance has " + std::to_string(count) + " driven targets from weight " +
+                 std::to_string(instance.firstDrivenWeight) + " on, but its rig has " +
+                 std::to_string(weights) + " weights");
+}
 
 Result<void> SceneBooks::checkMorphWriter(const SceneInstance& instance, const ScenePose& pose,
                                           std::uint32_t targets) const {
@@ -94,7 +117,9 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
                    std::to_string(instance.poseHandle.index) + " has " +
                    std::to_string(pose->jointCount));
   }
-  if (Result<void> good = checkMorphWriter(instance, *pose, mesh->info.morphTargetCount); !good)
+  if (Result<void> good = checkDrivenTargets(instance, *pose, mesh->info.morphTargetCount); !good)
+    return good;
+  if (Result<void> good = checkMorphWriter(instance, *pose, writtenTargets(instance, *mesh)); !good)
     return good;
   const PoseDescription own{pose->jointCount, 0, pose->promise};
   Batch batch;
@@ -111,11 +136,10 @@ Result<void> SceneBooks::check(const SceneInstance& instance, std::uint32_t upda
 /// is.
 Result<void> SceneBooks::takeWeights(SceneInstance& instance) {
   if (instance.morphWriter == MorphWriter::cpu || owner_.isCpu) return {};
-  instance.extras.writtenMorphs = meshes_.at(instance.mesh.index).info.morphTargetCount;
+  instance.extras.writtenMorphs =
+      meshes_.at(instance.mesh.index).info.morphTargetCount - instance.drivenTargets;
   if (instance.morphWriter == MorphWriter::clips) return {};
-  const std::uint64_t joints =
-      (instance.extras.writtenMorphs * sizeof(float) + sizeof(JointMatrix) - 1) /
-      sizeof(JointMatrix);
+  const std::uint32_t joints = jointsFor(instance.extras.writtenMorphs);
   const Result<std::optional<Range>> taken = takeJoints(joints, true, instance.weightsBuffer);
   if (!taken) return taken.error();
   if (!*taken) return noJoints(1, joints, true);
@@ -292,6 +316,9 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   instance.bounds = description.bounds;
   instance.morphWriter = description.morphWriter;
   instance.weightsOf = description.weightsOf;
+  instance.drivenTargets = description.drivenTargets;
+  instance.firstDrivenWeight = description.firstDrivenWeight;
+  if (!books.owner_.isCpu) instance.extras.drivenMorphs = description.drivenTargets;
   if (Result<void> good = books.check(instance, description.updateInterval); !good)
     return good.error();
   if (!books.hasSlot()) {
@@ -398,10 +425,10 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
     changed.extras.morphs.clear();
   if (mesh != nullptr && changed.morphWriter == MorphWriter::clips &&
       changed.extras.writtenMorphs != 0)
-    changed.extras.writtenMorphs = mesh->info.morphTargetCount;
+    changed.extras.writtenMorphs = writtenTargets(changed, *mesh);
   if (mesh != nullptr && change.morphs) {
     if (Result<void> good =
-            checkMorphs(*change.morphs, mesh->info.morphTargetCount, {"instance", handle.index});
+            checkMorphs(*change.morphs, writtenTargets(changed, *mesh), {"instance", handle.index});
         !good)
       return good;
     assignActive(*change.morphs, changed.extras.morphs);
@@ -451,7 +478,7 @@ Result<void> SceneBooks::setMorphWeights(InstanceHandle handle,
   SceneInstance& instance = instances_.at(handle.index);
   const SceneMesh& mesh = meshes_.at(instance.mesh.index);
   if (Result<void> good =
-          checkMorphs(morphs, mesh.info.morphTargetCount, {"instance", handle.index});
+          checkMorphs(morphs, writtenTargets(instance, mesh), {"instance", handle.index});
       !good)
     return good;
   std::vector<MorphWeight>& active = instance.extras.morphs;

@@ -70,26 +70,46 @@ Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCou
     return Error{ErrorCode::invalidArgument, "a pose has 1 to " + std::to_string(maxPoseJoints) +
                                                  " joints, not " + std::to_string(jointCount)};
   }
+  ScenePose pose;
+  pose.jointCount = pose.writtenJoints = pose.slotJoints = jointCount;
+  if (options.rig) {
+    const SceneRig* rig = books.rigs_.find(options.rig);
+    if (rig == nullptr) return unknownHandle("rig", options.rig);
+    if (rig->rig->writtenJoints() != jointCount) {
+      return invalid("the pose has " + std::to_string(jointCount) + " joints, but rig " +
+                     std::to_string(options.rig.index) + " has " +
+                     std::to_string(rig->rig->writtenJoints()) + " written ones");
+    }
+    pose.rig = options.rig.index;
+    pose.jointCount += rig->rig->drivenJoints();
+    pose.slotJoints += jointsFor(rig->rig->givenWeights());
+  }
   if (Result<void> good = checkPromise(options.promise, {"the pose"}); !good) return good;
   if (books.owner_.isCpu && options.writtenByGpu)
     return invalid("a pose that the GPU writes cannot be skinned on the CPU");
   if (poses.empty()) return {};
-  ScenePose pose;
-  const std::uint64_t count = std::uint64_t{jointCount} * poses.size();
+  const std::uint64_t count = std::uint64_t{pose.slotJoints} * poses.size();
   const Result<std::optional<Range>> joints =
       books.takeJoints(count, options.writtenByGpu, pose.buffer);
   if (!joints) return joints.error();
   if (!*joints) return books.noJoints(poses.size(), count, options.writtenByGpu);
-  pose.jointCount = jointCount;
   pose.promise = options.promise;
   pose.writtenByGpu = options.writtenByGpu;
-  const std::uint64_t size = std::uint64_t{jointCount} * books.slotsOf(options.writtenByGpu);
+  const std::uint64_t size = std::uint64_t{pose.slotJoints} * books.slotsOf(options.writtenByGpu);
   for (std::size_t index = 0; index < poses.size(); ++index) {
     pose.joints = {(*joints)->offset + index * size, size};
+    if (Result<void> taken = books.takeDriven(pose, pose.rig); !taken) {
+      for (const PoseHandle handle : poses.first(index)) books.dropPose(handle);
+      books.retire(books.poseBuffers_[pose.buffer].joints,
+                   {(*joints)->offset, size * poses.size()});
+      return taken;
+    }
     poses[index] = books.poses_.add(pose);
     if (options.writtenByGpu) continue;
     // No frame in flight reads their memory: it was free.
-    std::ranges::fill(books.matricesOf(pose), JointMatrix{});
+    const std::span<JointMatrix> memory = books.matricesOf(pose);
+    std::ranges::fill(memory.first(jointCount), JointMatrix{});
+    std::ranges::fill(std::as_writable_bytes(memory.subspan(jointCount)), std::byte{});
     books.upload(poses[index]);
   }
   return {};
@@ -109,6 +129,7 @@ Result<void> Scene::removePose(PoseHandle handle) {
 /// Of one that no instance uses. The caller retires its joints.
 void SceneBooks::dropPose(PoseHandle handle) {
   const ScenePose& pose = poses_.at(handle.index);
+  releaseDriven(pose);
   for (std::size_t form = 0; form < paletteFormCount; ++form) {
     const std::uint32_t unit = pose.forms[form].unit;
     if (unit == notUsed) continue;
@@ -126,7 +147,7 @@ Result<BufferPart> SceneBooks::posePart(PoseHandle handle) const {
                    " is written by the CPU; use writePose");
   }
   return BufferPart{poseBuffers_[pose->buffer].buffer.number, offsetOf(*pose),
-                    pose->jointCount * sizeof(JointMatrix)};
+                    pose->slotJoints * sizeof(JointMatrix)};
 }
 
 std::span<JointMatrix> SceneBooks::matricesOf(const ScenePose& pose) {
@@ -134,7 +155,12 @@ std::span<JointMatrix> SceneBooks::matricesOf(const ScenePose& pose) {
   JointMatrix* const begin = store.buffer.mapped != nullptr
                                  ? reinterpret_cast<JointMatrix*>(store.buffer.mapped)
                                  : store.staged.data();
-  return {begin + offsetOf(pose) / sizeof(JointMatrix), pose.jointCount};
+  return {begin + offsetOf(pose) / sizeof(JointMatrix), pose.slotJoints};
+}
+
+std::span<JointMatrix> SceneBooks::drivenOf(const ScenePose& pose) {
+  auto* const begin = reinterpret_cast<JointMatrix*>(poseBuffers_[pose.drivenBuffer].buffer.mapped);
+  return {begin + pose.driven.offset, static_cast<std::size_t>(pose.driven.size)};
 }
 
 Result<void> SceneBooks::mayWrite() const {
@@ -172,7 +198,17 @@ Result<std::span<JointMatrix>> Scene::writePose(PoseHandle handle) {
     books.markWritten(pose, handle);
     books.upload(handle);
   }
-  return books.matricesOf(pose);
+  return books.matricesOf(pose).first(pose.writtenJoints);
+}
+
+Result<std::span<float>> Scene::writePoseWeights(PoseHandle handle) {
+  const Result<std::span<JointMatrix>> written = writePose(handle);
+  if (!written) return written.error();
+  const ScenePose& pose = books_->poses_.at(handle.index);
+  const std::size_t count =
+      pose.rig == notUsed ? 0 : books_->rigs_.at(pose.rig).rig->givenWeights();
+  auto* const begin = reinterpret_cast<float*>(written->data() + written->size());
+  return std::span<float>(begin, count);
 }
 
 Result<void> Scene::markWritten(std::span<const PoseHandle> poses) {

@@ -159,12 +159,14 @@ SceneBooks& Scene::changed() {
 }
 
 Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& description) const {
-  PipelineNeeds needs{.method = description.method,
-                      .layout = description.layout,
-                      .bounds = description.bounds,
-                      .culledOnGpu = description.culledOnGpu,
-                      .figures = !description.pose && books_->figures_.size() != 0,
-                      .morphsOnGpu = description.morphWriter != MorphWriter::cpu};
+  PipelineNeeds needs{
+      .method = description.method,
+      .layout = description.layout,
+      .bounds = description.bounds,
+      .culledOnGpu = description.culledOnGpu,
+      .figures = !description.pose && books_->figures_.size() != 0,
+      .morphsOnGpu = description.morphWriter != MorphWriter::cpu || description.drivenTargets != 0,
+      .rigs = !description.pose && books_->rigs_.size() != 0};
   if (description.morphWriter > MorphWriter::clips)
     return notAValue("the instance: its morphWriter", description.morphWriter, "MorphWriter");
   if (description.mesh) {
@@ -177,6 +179,7 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
     if (pose == nullptr) return unknownHandle("pose", description.pose);
     needs.promise = pose->promise;
     needs.figures = pose->figure != notUsed;
+    needs.rigs = pose->rig != notUsed;
   }
   if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   return needs;

@@ -56,5 +56,8 @@ Result<BufferPart> SceneCommands::posePart(PoseHandle pose) const {
 Result<BufferPart> SceneCommands::weightsPart(InstanceHandle instance) const {
   return SceneAccess::books(scene()).weightsPart(instance);
 }
+Result<BufferPart> SceneCommands::drivenPart(PoseHandle pose) const {
+  return SceneAccess::books(scene()).drivenPart(pose);
+}
 
 }  // namespace dermis

@@ -207,6 +207,9 @@ Result<BufferRange> SceneRecorder::poseRange(PoseHandle pose) const {
 Result<BufferRange> SceneRecorder::weightsRange(InstanceHandle instance) const {
   return state_->rangeOf(state_->books().weightsPart(instance));
 }
+Result<BufferRange> SceneRecorder::drivenRange(PoseHandle pose) const {
+  return state_->rangeOf(state_->books().drivenPart(pose));
+}
 
 Result<BufferRange> SceneRecorder::State::rangeOf(const Result<BufferPart>& part) const {
   if (!part) return part.error();

@@ -1,0 +1,32 @@
+// A rig with every kind of driver, for poses of eight joints.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dermis/rig.h"
+
+namespace dermis::test {
+
+inline constexpr std::uint32_t riggedJoints = 8;  ///< written
+inline constexpr std::uint32_t drivenJoints = 7;  ///< two twists, an offset, a chain, a linear one
+inline constexpr std::uint32_t givenWeights = 2;
+inline constexpr std::uint32_t drivenWeights = 5;
+
+/// `seed` changes what drivers have for numbers. `weightsOf`: the node of its given weights.
+PackedRig riggedPose(std::uint32_t seed = 1, std::uint32_t given = givenWeights,
+                     std::uint32_t weightsOf = 0xffffffffu);
+
+/// What a rig drives.
+struct Driven {
+  std::vector<JointMatrix> joints;
+  std::vector<float> weights;  ///< all
+};
+Driven evaluated(const PackedRig& rig, std::span<const JointMatrix> written,
+                 std::span<const float> given);
+
+/// The largest difference of two numbers.
+float largestDifference(const Driven& a, const Driven& b);
+
+}  // namespace dermis::test
