@@ -81,7 +81,8 @@ int main(int argc, char** argv) {
                                   .bounds = row.bounds,
                                   .culledOnGpu = true,
                                   .figures = true,
-                                  .morphsOnGpu = true};
+                                  .morphsOnGpu = true,
+                                  .rigs = true};
         for (const PipelineId id : samples::must(pipelines(needs, limits, Tuning{}))) {
           if (!seen.insert(id).second) continue;
           const auto pipeline = samples::must(vulkan::pipelineDescription(id));
