@@ -216,15 +216,17 @@ struct PaletteRecord {
   uint place;
   uint jointCount;
   uint needed;  // 0: nothing is converted, unless the visibility kernel sets it
-  // Only with a rig: the unit of the first driven joint in its buffer, and the number of joints
-  // before it.
-  uint driven;
-  uint writtenJoints;
+};
+DERMIS_CONSTANT PALETTE_WORDS = 4u;
+DERMIS_CONSTANT PALETTE_NEEDED = 3u;  // the word of `needed`
+// Of a pose with a rig, for each PaletteRecord.
+struct DrivenRecord {
+  uint driven;         // unit of the first driven joint in its buffer
+  uint writtenJoints;  // the number of joints before it
   uint reserved0;
   uint reserved1;
 };
-DERMIS_CONSTANT PALETTE_WORDS = 8u;
-DERMIS_CONSTANT PALETTE_NEEDED = 3u;  // the word of `needed`
+DERMIS_CONSTANT DRIVEN_WORDS = 4u;
 DERMIS_CONSTANT UNITS_OF_DUAL_QUATERNION = 2u;
 DERMIS_CONSTANT UNITS_OF_LOGARITHM = 3u;  // the rows of a 3×4 matrix
 DERMIS_CONSTANT UNITS_OF_MATRIX = 3u;
@@ -473,6 +475,7 @@ DERMIS_CONSTANT BINDING_VISIBLE_RESULTS = 3u;
 struct PalettePush {
   uint palettes;  // word offset of the palette records
   uint workgroupCount;
+  uint driven;  // the same of DrivenRecords, with a rig
 };
 struct SamplePush {
   uint figures;         // word offset of the figure records

@@ -76,15 +76,17 @@ void main() {
   if (number >= push.workgroupCount) return;
   PaletteRecord palette = loadPalette(push.palettes + number * PALETTE_WORDS);
   if (palette.needed == 0u) return;
+  DrivenRecord rigged = DrivenRecord(0u, palette.jointCount, 0u, 0u);
+  if (RIGGED) rigged = loadDriven(push.driven + number * DRIVEN_WORDS);
   if (METHOD == METHOD_LINEAR) {
     uint units = palette.jointCount * UNITS_OF_MATRIX;
-    uint writtenUnits = RIGGED ? palette.writtenJoints * UNITS_OF_MATRIX : units;
+    uint writtenUnits = RIGGED ? rigged.writtenJoints * UNITS_OF_MATRIX : units;
     for (uint unit = gl_LocalInvocationID.x; unit < units; unit += gl_WorkGroupSize.x) {
       uvec4 row;
       if (unit < writtenUnits || !RIGGED) {
         row = matrices[palette.matrices + unit];
       } else {
-        row = driven[palette.driven + unit - writtenUnits];
+        row = driven[rigged.driven + unit - writtenUnits];
       }
       palettes[palette.place + unit] = row;
     }
@@ -102,8 +104,8 @@ void main() {
     vec4 r0 = vec4(0.0);
     vec4 r1 = vec4(0.0);
     vec4 r2 = vec4(0.0);
-    bool isDriven = RIGGED && joint >= palette.writtenJoints;
-    uint from = isDriven ? palette.driven + (joint - palette.writtenJoints) * UNITS_OF_MATRIX
+    bool isDriven = RIGGED && joint >= rigged.writtenJoints;
+    uint from = isDriven ? rigged.driven + (joint - rigged.writtenJoints) * UNITS_OF_MATRIX
                          : palette.matrices + joint * UNITS_OF_MATRIX;
     uint end = from + UNITS_OF_MATRIX;
     [[dont_unroll]] do {

@@ -22,8 +22,12 @@ uvec4 tableUnit(uint word) { return tableUnits[word / 4u]; }
 
 PaletteRecord loadPalette(uint word) {
   uvec4 a = tableUnit(word);
-  uvec4 b = tableUnit(word + 4u);
-  return PaletteRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
+  return PaletteRecord(a.x, a.y, a.z, a.w);
+}
+
+DrivenRecord loadDriven(uint word) {
+  uvec4 a = tableUnit(word);
+  return DrivenRecord(a.x, a.y, a.z, a.w);
 }
 
 RigRecord loadRig(uint word) {

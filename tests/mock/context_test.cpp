@@ -441,7 +441,8 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
       {abi::CONSTANT_SCALES, 1},
       {abi::CONSTANT_FULL, 1},
       {abi::CONSTANT_RECORD, 24},
-      {abi::CONSTANT_RIGID, 0}};
+      {abi::CONSTANT_RIGID, 0},
+      {abi::CONSTANT_RIGGED, 0}};
   ASSERT_EQ(std::size(expected), abi::CONSTANT_COUNT);
   for (const auto& [id, value] : expected) EXPECT_EQ(constants[id], value) << id;
 
@@ -449,6 +450,8 @@ TEST(KernelsTest, ConstantsStandAtTheirIds) {
   palette.kernel = Kernel::palette;
   palette.rigid = true;
   EXPECT_EQ(vulkan::pipelineDescription(palette.id())->constants[abi::CONSTANT_RIGID], 1u);
+  palette.rigged = true;
+  EXPECT_EQ(vulkan::pipelineDescription(palette.id())->constants[abi::CONSTANT_RIGGED], 1u);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ static_assert(abi::FORMAT_OCTAHEDRAL16X2 ==
 static_assert(abi::FORMAT_OCTAHEDRAL8X2 == static_cast<std::uint32_t>(VertexFormat::octahedral8x2));
 // Records are read four words at a time.
 static_assert(sizeof(abi::PaletteRecord) == abi::PALETTE_WORDS * 4);
+static_assert(sizeof(abi::DrivenRecord) == abi::DRIVEN_WORDS * 4);
 static_assert(sizeof(abi::GroupRecord) == abi::GROUP_WORDS * 4 && abi::GROUP_WORDS % 4 == 0);
 static_assert(sizeof(abi::InstanceRecord) == abi::INSTANCE_WORDS * 4 &&
               abi::INSTANCE_WORDS % 4 == 0);

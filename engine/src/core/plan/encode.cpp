@@ -212,13 +212,13 @@ Result<void> Encoder::addPaletteDispatches() {
   for (const Work::Poses& lists : work_->poses) {
     for (std::size_t form = 0; form < paletteFormCount; ++form) {
       for (std::size_t promise = 0; promise < jointPromiseCount; ++promise) {
-        const std::span<const abi::PaletteRecord> records = lists.records[form][promise];
         paletteWords_.push_back(wordsOf(plan_->tables));
-        if (records.empty()) continue;
+        if (lists.records[form][promise].empty()) continue;
         const Variant variant =
             paletteVariant(static_cast<PaletteForm>(form), static_cast<JointPromise>(promise),
                            lists.drivenBuffer != notUsed, limits_, tuning_);
-        if (Result<void> good = addPaletteDispatch(variant, records, lists); !good) return good;
+        if (Result<void> good = addPaletteDispatch(variant, lists, form, promise); !good)
+          return good;
       }
     }
   }
@@ -226,14 +226,20 @@ Result<void> Encoder::addPaletteDispatches() {
 }
 
 /// One workgroup per palette.
-Result<void> Encoder::addPaletteDispatch(const Variant& variant,
-                                         std::span<const abi::PaletteRecord> records,
-                                         const Work::Poses& poses) {
+Result<void> Encoder::addPaletteDispatch(const Variant& variant, const Work::Poses& poses,
+                                         std::size_t form, std::size_t promise) {
   std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::uint32_t first = wordsOf(tables);
-  tables.resize(first + records.size() * abi::PALETTE_WORDS);
-  std::memcpy(&tables[first], records.data(), records.size_bytes());
-  if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0}); !good)
+  const auto append = [&tables](const auto& records) {
+    const std::uint32_t first = wordsOf(tables);
+    const std::size_t size = std::span(records).size_bytes();
+    tables.resize(first + size / 4);
+    if (size != 0) std::memcpy(&tables[first], records.data(), size);
+    return first;
+  };
+  const auto& records = poses.records[form][promise];
+  const std::uint32_t first = append(records), driven = append(poses.driven[form][promise]);
+  if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0, driven});
+      !good)
     return good;
   dispatches_.back().stage = paletteStage_;
   dispatches_.back().joints = poses.joints;

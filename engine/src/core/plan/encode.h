@@ -52,9 +52,8 @@ class Encoder {
   Result<void> addFigureDispatches();
   Result<void> addRigDispatches();
   Result<void> addPaletteDispatches();
-  Result<void> addPaletteDispatch(const Variant& variant,
-                                  std::span<const abi::PaletteRecord> records,
-                                  const Work::Poses& poses);
+  Result<void> addPaletteDispatch(const Variant& variant, const Work::Poses& poses,
+                                  std::size_t form, std::size_t promise);
   Result<void> addClearDispatch();
   std::uint64_t vertexGroupsOf(const Group& group) const;
   void chooseVerticesPerInvocation(std::span<const std::uint32_t> groups);

@@ -25,6 +25,9 @@ void Work::begin(Groups& groupsInUse) {
     for (auto& ofForm : lists.records) {
       for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
     }
+    for (auto& ofForm : lists.driven) {
+      for (std::vector<abi::DrivenRecord>& records : ofForm) records.clear();
+    }
   }
   banks.clear();
   rigs.clear();

@@ -92,8 +92,10 @@ struct Work {
   struct Poses {
     std::uint32_t buffer = 0, drivenBuffer = notUsed;
     BufferRole joints = BufferRole::poses;
-    std::array<std::array<std::vector<abi::PaletteRecord>, jointPromiseCount>, paletteFormCount>
-        records;
+    template <typename Record>
+    using ByKind = std::array<std::array<std::vector<Record>, jointPromiseCount>, paletteFormCount>;
+    ByKind<abi::PaletteRecord> records;
+    ByKind<abi::DrivenRecord> driven;  ///< the same palettes; only with a rig
   };
   /// A bank that figures play.
   struct Bank {
@@ -162,8 +164,11 @@ struct Work {
     lists.joints = source.role;
     std::vector<abi::PaletteRecord>& records =
         lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)];
-    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u, source.drivenUnit,
-                       source.writtenJoints, 0, 0});
+    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
+    if (source.drivenBuffer != notUsed) {
+      lists.driven[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)].push_back(
+          {source.drivenUnit, source.writtenJoints, 0, 0});
+    }
     ++poseCount;
     return {buffers, form, promise, static_cast<std::uint32_t>(records.size() - 1)};
   }
