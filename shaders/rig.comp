@@ -16,7 +16,13 @@ layout(local_size_x_id = CONSTANT_WORKGROUP_SIZE) in;
 
 layout(push_constant) uniform Push { RigPush push; };
 
+#ifdef TEXELS
+uvec4 jointUnit(uint unit) { return paletteBits(unit); }
+#else
 layout(set = 0, binding = BINDING_JOINTS, std430) readonly buffer Joints { uvec4 joints[]; };
+
+uvec4 jointUnit(uint unit) { return joints[unit]; }
+#endif
 layout(set = 0, binding = BINDING_JOINTS, std430) readonly buffer JointWords { uint jointWords[]; };
 // What an invocation reads of these, it has written.
 layout(set = 0, binding = BINDING_DRIVEN, std430) buffer Driven { uvec4 driven[]; };
@@ -37,9 +43,9 @@ Transform jointAt(uint number) {
   uvec4 r2;
   if (number < writtenJoints) {
     uint unit = pose.joints + number * UNITS_OF_MATRIX;
-    r0 = joints[unit];
-    r1 = joints[unit + 1u];
-    r2 = joints[unit + 2u];
+    r0 = jointUnit(unit);
+    r1 = jointUnit(unit + 1u);
+    r2 = jointUnit(unit + 2u);
   } else {
     uint unit = pose.driven + (number - writtenJoints) * UNITS_OF_MATRIX;
     r0 = driven[unit];
@@ -248,6 +254,12 @@ void takeWeights(uint count, uint figure, uint layerCount) {
   }
 }
 
+// Kind, offset, number of parts; after the last one, no kind. `drivers`: the offset of all, and their number.
+uvec4 driverAt(uvec4 drivers, uint number) {
+  uvec4 driver = rigUnit(drivers.x + min(number, drivers.y - 1u) * RIG_DRIVER_WORDS);
+  return number < drivers.y ? driver : uvec4(0xffffffffu);
+}
+
 void main() {
   uint number = workgroupNumber() * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
   if (number >= push.poseCount) return;
@@ -264,16 +276,25 @@ void main() {
   scratchUnit = (weightWord + counts.z + counts.w + 3u) / 4u;
   takeWeights(counts.z, pose.figure, layerCount);
   uvec4 drivers = rigUnit(RIG_DRIVERS);  // offset, number
-  for (uint i = 0u; i < drivers.y; ++i) {
-    uvec4 driver = rigUnit(drivers.x + i * RIG_DRIVER_WORDS);  // kind, offset, number of parts
-    if (driver.x == RIG_TWIST) {
+  // A loop for each kind, since lavapipe would execute all branches for every driver. Those of one kind mostly follow each other.
+  uint i = 0u;
+  while (i < drivers.y) {
+    uvec4 driver = driverAt(drivers, i);
+    while (driver.x == RIG_TWIST) {
       evaluateTwist(driver.y);
-    } else if (driver.x == RIG_CORRECTIVE) {
+      driver = driverAt(drivers, ++i);
+    }
+    while (driver.x == RIG_CORRECTIVE) {
       evaluateCorrective(driver.y);
-    } else if (driver.x == RIG_CHAIN) {
+      driver = driverAt(drivers, ++i);
+    }
+    while (driver.x == RIG_CHAIN) {
       evaluateChain(driver.y, driver.z);
-    } else {
+      driver = driverAt(drivers, ++i);
+    }
+    while (driver.x == RIG_LINEAR) {
       evaluateLinear(driver.y, driver.z);
+      driver = driverAt(drivers, ++i);
     }
   }
 }

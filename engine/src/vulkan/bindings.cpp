@@ -47,10 +47,10 @@ bool isSame(const BufferRange& a, const BufferRange& b) {
 
 // -- Views.
 
-Result<void> createTexelView(const ContextState& context, BufferRole role, bool isScene,
-                             BoundBuffer& buffer) {
+Result<void> createTexelView(const ContextState& context, BufferRole role, BoundBuffer& buffer) {
   const bool isRead = role == BufferRole::tables || role == BufferRole::meshes ||
-                      role == BufferRole::palettes || (role == BufferRole::poses && !isScene);
+                      role == BufferRole::palettes || role == BufferRole::poses ||
+                      role == BufferRole::gpuPoses;
   const std::uint64_t texels = buffer.range.size / abi::TEXEL_BYTES;
   if (context.texelBindingCount() == 0 || !isRead || buffer.range.buffer == VK_NULL_HANDLE ||
       texels == 0)
@@ -230,7 +230,7 @@ Result<Bindings> Context::createBindings(const BatchBuffers& buffers) const {
         {BufferRole::previousPositions, &outputs[Stream::previousPositions]}}) {
     BoundBuffer& bound = state.bound[static_cast<std::size_t>(role)];
     bound.range = *range;
-    if (Result<void> made = createTexelView(*state.context, role, false, bound); !made)
+    if (Result<void> made = createTexelView(*state.context, role, bound); !made)
       return made.error();
   }
   return bindings;

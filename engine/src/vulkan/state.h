@@ -76,8 +76,7 @@ using BoundBuffers = std::vector<BoundBuffer>;
 
 /// Creates the view that kernels for CPU devices need of a buffer with this role; none for other
 /// devices.
-Result<void> createTexelView(const ContextState& context, BufferRole role, bool isScene,
-                             BoundBuffer& buffer);
+Result<void> createTexelView(const ContextState& context, BufferRole role, BoundBuffer& buffer);
 void destroyTexelView(const ContextState& context, BoundBuffer& buffer);
 
 /// The descriptors of a dispatch, by binding number.

@@ -680,8 +680,8 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
     };
     texels(abi::BINDING_TABLE_TEXELS, tables);
     texels(abi::BINDING_MESH_TEXELS, buffers[BufferRole::meshes]);
-    const bool isOfScene = variant.kernel == Kernel::compose || variant.kernel == Kernel::rig;
-    texels(abi::BINDING_PALETTE_TEXELS, isOfScene ? buffers[BufferRole::palettes] : joints);
+    const bool writesPoses = variant.kernel == Kernel::compose;
+    texels(abi::BINDING_PALETTE_TEXELS, writesPoses ? buffers[BufferRole::palettes] : joints);
   }
   auto& command = std::get<DispatchCommand>(
       plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));

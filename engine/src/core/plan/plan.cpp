@@ -90,11 +90,9 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
     case BufferRole::meshes:
       return {meshes, alignment, read | copiedTo | (isScene ? copiedFrom : 0)};
     case BufferRole::poses:
-      // In a scene the skin kernel reads palettes only, so poses need no texel buffer usage.
-      if (isScene) return {poses, alignment, storage | copiedTo};
       return {poses, alignment, read | copiedTo};
     case BufferRole::gpuPoses:
-      if (isScene) return {gpuPoses, alignment, written};
+      if (isScene) return {gpuPoses, alignment, read | written};
       break;
     case BufferRole::tables:
       if (isScene) return {tables, alignment, read | copiedTo | indirect};

@@ -319,7 +319,7 @@ class RigPacker {
     return std::prev(range)->driver;
   }
 
-  /// Drivers after those that they read, otherwise in the order of the view.
+  /// Drivers after those that they read, and as many of one kind as possible after each other.
   Result<void> order() {
     std::vector<std::size_t> waitsFor(drivers_.size());
     std::vector<std::vector<std::size_t>> readers(drivers_.size());
@@ -335,12 +335,22 @@ class RigPacker {
       waitsFor[i] = before.size();
       for (const std::size_t other : before) readers[other].push_back(i);
     }
-    for (std::size_t i = 0; i < drivers_.size(); ++i) {
-      if (waitsFor[i] == 0) order_.push_back(i);
+    std::array<std::vector<std::size_t>, 4> ready;  // by kind
+    const auto add = [&](std::size_t i) { ready[drivers_[i].kind].push_back(i); };
+    for (std::size_t i = drivers_.size(); i-- > 0;) {
+      if (waitsFor[i] == 0) add(i);
     }
-    for (std::size_t place = 0; place < order_.size(); ++place) {
-      for (const std::size_t reader : readers[order_[place]]) {
-        if (--waitsFor[reader] == 0) order_.push_back(reader);
+    const auto isEmpty = [&] {
+      return std::ranges::all_of(ready, &std::vector<std::size_t>::empty);
+    };
+    for (std::size_t kind = 0; !isEmpty(); kind = (kind + 1) % ready.size()) {
+      while (!ready[kind].empty()) {
+        const std::size_t next = ready[kind].back();
+        ready[kind].pop_back();
+        order_.push_back(next);
+        for (const std::size_t reader : readers[next]) {
+          if (--waitsFor[reader] == 0) add(reader);
+        }
       }
     }
     if (order_.size() == drivers_.size()) return {};

@@ -252,7 +252,7 @@ Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
     if (wanted.isMapped) mapped = own.bytes().data();
   }
   BoundBuffer buffer{range};
-  if (Result<void> made = createTexelView(*context, wanted.role, true, buffer); !made)
+  if (Result<void> made = createTexelView(*context, wanted.role, buffer); !made)
     return made.error();
   buffers.resize(std::max(buffers.size(), wanted.number + std::size_t{1}));
   bound.resize(buffers.size());
