@@ -53,6 +53,10 @@ void dispatchSampling(const ClipPlan& plan, const PackedLayers& layers, ClipScra
   chosen().load(std::memory_order_relaxed)->sample(plan, layers, scratch, poses);
 }
 
+void dispatchRigs(const PackedRig& rig, std::span<const RigPose> poses, RigScratch& scratch) {
+  chosen().load(std::memory_order_relaxed)->evaluate(rig, poses, scratch);
+}
+
 std::vector<std::string_view> targetNames() {
   std::vector<std::string_view> names;
   for (const InstructionSet* const set : instructionSets) {

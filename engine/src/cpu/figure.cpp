@@ -1,28 +1,54 @@
-// Samples the poses of figures.
-#include <atomic>
-#include <cstdint>
+// What several tasks need: the poses of figures, and what rigs drive.
+#include <algorithm>
+#include <cstddef>
+#include <span>
 
+#include "clips/bank.h"
+#include "clips/sample.h"
 #include "cpu/clip_plan.h"
 #include "cpu/task.h"
 #include "cpu/thread_memory.h"
+#include "rig/blob.h"
 
 namespace dermis::cpu {
 
 void FigureTask::finish() {
-  State found = state.load(std::memory_order_acquire);
-  if (found == State::waiting) {
-    ClipScratch& scratch = threadMemory().clips;
-    scratch.prepare(*plan);
-    if (state.compare_exchange_strong(found, State::busy, std::memory_order_acquire)) {
-      dispatchSampling(*plan, layers, scratch, matrices);
-      state.store(State::done, std::memory_order_release);
-      state.notify_all();
-      return;
+  ClipScratch& scratch = threadMemory().clips;
+  work.finish([&] { scratch.prepare(*plan); },
+              [&] { dispatchSampling(*plan, layers, scratch, matrices); });
+}
+
+void RigTask::finish() {
+  RigScratch& scratch = threadMemory().rigs;
+  const auto evaluate = [&] {
+    for (std::size_t i = 0; i < count; ++i) {
+      const RigPose& pose = poses[i];
+      FigureTask* const figure = figures[i];
+      if (figure != nullptr) {
+        figure->finish();
+        const PackedClips& bank = *figure->plan->bank;
+        if (const auto node = ClipBank(bank).morphedNode(rig->weightsOf()))
+          sampleWeights(bank, figure->layers, *node, pose.weights.first(rig->givenWeights()));
+      }
+      std::ranges::copy(pose.written, pose.driven.data() - pose.written.size());
     }
-  }
-  while (found != State::done) {
-    state.wait(found, std::memory_order_acquire);
-    found = state.load(std::memory_order_acquire);
+    dispatchRigs(*rig, std::span(poses).first(count), scratch);
+  };
+  work.finish([&] { scratch.prepare(*rig); }, evaluate);
+}
+
+void RigScratch::prepare(const PackedRig& rig) {
+  const RigHeader header = RigBlob(rig).header;
+  const std::size_t count = maxRigExamples + std::size_t{header.givenWeights} +
+                            header.drivenWeights + std::size_t{4} * header.mostInputs;
+  if (numbers.size() < count) numbers.resize(count);
+}
+
+void evaluatePlainly(const PackedRig& rig, std::span<const RigPose> poses, RigScratch&) {
+  for (const RigPose& pose : poses) {
+    // The sizes fit.
+    static_cast<void>(
+        evaluateRig(rig, pose.written, pose.givenWeights, pose.driven, pose.weights).ok());
   }
 }
 

@@ -28,6 +28,8 @@ struct InstructionSet {
   void (*skin)(const Task& task, Scratch* scratch);  ///< see `dispatchTask`
   void (*sample)(const ClipPlan& plan, const PackedLayers& layers, ClipScratch& scratch,
                  std::span<JointMatrix> poses);  ///< see `dispatchSampling`
+  void (*evaluate)(const PackedRig& rig, std::span<const RigPose> poses,
+                   RigScratch& scratch);  ///< see `dispatchRigs`
 };
 
 extern const InstructionSet avx3, avx2, sse4;

@@ -6,10 +6,11 @@
 #define HWY_DISABLED_TARGETS (~HWY_AVX3)
 #define HWY_BROKEN_TARGETS 0
 #include "cpu/kernels_inl.h"
+#include "cpu/rig_inl.h"
 #include "cpu/sample_inl.h"
 
 namespace dermis::cpu {
 constinit const InstructionSet avx3{HWY_TARGET, HWY_NAMESPACE::skinTask,
-                                    HWY_NAMESPACE::sampleFigure};
+                                    HWY_NAMESPACE::sampleFigure, HWY_NAMESPACE::rigs::evaluateRigs};
 }
 #endif

@@ -1,7 +1,7 @@
 // The kernels that need nothing but what the compiler assumes. On arm64, these are the kernels for
 // NEON. On x86 they are the fallback for processors without SSE4: for SSE2 or, with Highway 1.0,
 // for EMU128, which is plain code. The fallback has only the stages (stages_inl.h), and samples
-// figures by the code of core.
+// figures and evaluates rigs by the code of core.
 #include "cpu/kernels.h"
 
 #ifdef DERMIS_CPU_HAS_BASELINE
@@ -18,15 +18,18 @@
 #define HWY_COMPILE_ONLY_STATIC
 #include "cpu/kernels_inl.h"
 #ifndef DERMIS_CPU_STAGES_ONLY
+#include "cpu/rig_inl.h"
 #include "cpu/sample_inl.h"
 #endif
 
 namespace dermis::cpu {
 #ifdef DERMIS_CPU_STAGES_ONLY
-constinit const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask, samplePlainly};
+constinit const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask, samplePlainly,
+                                        evaluatePlainly};
 #else
 constinit const InstructionSet baseline{HWY_TARGET, HWY_NAMESPACE::skinTask,
-                                        HWY_NAMESPACE::sampleFigure};
+                                        HWY_NAMESPACE::sampleFigure,
+                                        HWY_NAMESPACE::rigs::evaluateRigs};
 #endif
 }  // namespace dermis::cpu
 #endif

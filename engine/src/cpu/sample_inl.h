@@ -175,40 +175,6 @@ DERMIS_INLINE Vec4<Wide> quaternionOf(const WideKeys& key) {
           bySign(high, bySign(low, v.z, other), v.y), bySign(hn::And(high, low), other, v.z)};
 }
 
-DERMIS_INLINE void scatterRows(Four d, Vec4<Four> rows, float* const* to) {
-  transpose4(d, rows.x, rows.y, rows.z, rows.w);
-  hn::StoreU(rows.x, d, to[0]);
-  hn::StoreU(rows.y, d, to[1]);
-  hn::StoreU(rows.z, d, to[2]);
-  hn::StoreU(rows.w, d, to[3]);
-}
-DERMIS_INLINE Vec4<Four> gatherRows(Four d, const float* const* from, std::size_t offset) {
-  Vec4<Four> rows{hn::LoadU(d, from[0] + offset), hn::LoadU(d, from[1] + offset),
-                  hn::LoadU(d, from[2] + offset), hn::LoadU(d, from[3] + offset)};
-  transpose4(d, rows.x, rows.y, rows.z, rows.w);
-  return rows;
-}
-#if HWY_MAX_BYTES >= 32
-DERMIS_INLINE void scatterRows(Eight d, Vec4<Eight> rows, float* const* to) {
-  const Four four;
-  transpose4(d, rows.x, rows.y, rows.z, rows.w);
-  hn::StoreU(hn::LowerHalf(four, rows.x), four, to[0]);
-  hn::StoreU(hn::LowerHalf(four, rows.y), four, to[1]);
-  hn::StoreU(hn::LowerHalf(four, rows.z), four, to[2]);
-  hn::StoreU(hn::LowerHalf(four, rows.w), four, to[3]);
-  hn::StoreU(hn::UpperHalf(four, rows.x), four, to[4]);
-  hn::StoreU(hn::UpperHalf(four, rows.y), four, to[5]);
-  hn::StoreU(hn::UpperHalf(four, rows.z), four, to[6]);
-  hn::StoreU(hn::UpperHalf(four, rows.w), four, to[7]);
-}
-DERMIS_INLINE Vec4<Eight> gatherRows(Eight d, const float* const* from, std::size_t offset) {
-  const Four four;
-  const Vec4<Four> low = gatherRows(four, from, offset), high = gatherRows(four, from + 4, offset);
-  return {hn::Combine(d, high.x, low.x), hn::Combine(d, high.y, low.y),
-          hn::Combine(d, high.z, low.z), hn::Combine(d, high.w, low.w)};
-}
-#endif
-
 /// Interpolates the rotations of a batch.
 template <std::uint32_t size>
 inline HWY_ATTR void sampleRotations(const KeyBatch& batch) {
@@ -221,7 +187,7 @@ inline HWY_ATTR void sampleRotations(const KeyBatch& batch) {
     const auto other = toHemisphere(d, a, b, fraction);
     const Vec4<Wide> q{mix<Wide>(a.x, share, b.x, other), mix<Wide>(a.y, share, b.y, other),
                        mix<Wide>(a.z, share, b.z, other), mix<Wide>(a.w, share, b.w, other)};
-    scatterRows(d, normalized(d, q), batch.places.data() + i);
+    scatterRows(d, normalized(d, q), batch.places.data() + i, 0);
   }
 }
 

@@ -228,7 +228,7 @@ void SceneRunner::State::placeFigures() {
     task.plan = &plans.at(&books().clips_.at(figure.clips.index).content->bank);
     task.layers = figure.layers;
     task.matrices = books().matricesOf(figure);
-    task.state.store(FigureTask::State::waiting, std::memory_order_relaxed);
+    task.work.restart();
   }
 }
 

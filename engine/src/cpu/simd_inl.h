@@ -171,5 +171,46 @@ DERMIS_INLINE void storeRows(Eight d, const Vec4<Eight>& rows, float* to, std::s
 }
 #endif
 
+// Blocks of four floats, each at the address of its first lane plus `offset` floats.
+
+DERMIS_INLINE Vec<Four> loadBlocks(Four d, const float* const* from, std::size_t offset) {
+  return hn::LoadU(d, *from + offset);
+}
+DERMIS_INLINE void storeBlocks(Four d, Vec<Four> blocks, float* const* to, std::size_t offset) {
+  hn::StoreU(blocks, d, *to + offset);
+}
+#if HWY_MAX_BYTES >= 32
+template <class D>
+DERMIS_INLINE Vec<D> loadBlocks(D d, const float* const* from, std::size_t offset) {
+  const hn::Half<D> half;
+  return hn::Combine(d, loadBlocks(half, from + hn::MaxLanes(half), offset),
+                     loadBlocks(half, from, offset));
+}
+template <class D>
+DERMIS_INLINE void storeBlocks(D, Vec<D> blocks, float* const* to, std::size_t offset) {
+  const hn::Half<D> half;
+  storeBlocks(half, hn::LowerHalf(half, blocks), to, offset);
+  storeBlocks(half, hn::UpperHalf(half, blocks), to + hn::MaxLanes(half), offset);
+}
+#endif
+
+/// As `loadRows`, but each lane has its own address, to which `offset` floats are added.
+template <class D>
+DERMIS_INLINE Vec4<D> gatherRows(D d, const float* const* from, std::size_t offset) {
+  Vec4<D> rows{loadBlocks(d, from, offset), loadBlocks(d, from + 1, offset),
+               loadBlocks(d, from + 2, offset), loadBlocks(d, from + 3, offset)};
+  transpose4(d, rows.x, rows.y, rows.z, rows.w);
+  return rows;
+}
+/// The inverse of `gatherRows`.
+template <class D>
+DERMIS_INLINE void scatterRows(D d, Vec4<D> rows, float* const* to, std::size_t offset) {
+  transpose4(d, rows.x, rows.y, rows.z, rows.w);
+  storeBlocks(d, rows.x, to, offset);
+  storeBlocks(d, rows.y, to + 1, offset);
+  storeBlocks(d, rows.z, to + 2, offset);
+  storeBlocks(d, rows.w, to + 3, offset);
+}
+
 }  // namespace dermis::cpu::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

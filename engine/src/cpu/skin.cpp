@@ -123,11 +123,45 @@ Result<void> checkMethod(Method method, const char* subject) {
                " is a method for comparison, which the CPU path does not support");
 }
 
+namespace {
+
+/// Copies of the instances, whose lists of morph targets also have those that rigs drive. They are
+/// valid until the thread's next call.
+std::span<const TaskInstance> withDrivenTargets(std::span<const TaskInstance> instances) {
+  ThreadMemory& memory = threadMemory();
+  memory.drivenInstances.assign(instances.begin(), instances.end());
+  std::vector<MorphWeight>& morphs = memory.drivenMorphs;
+  morphs.clear();
+  std::size_t most = 0;
+  for (const TaskInstance& instance : instances)
+    most += instance.morphs.size() + instance.drivenWeights.size();
+  morphs.reserve(most);
+  for (TaskInstance& instance : memory.drivenInstances) {
+    const std::size_t first = morphs.size();
+    morphs.insert(morphs.end(), instance.morphs.begin(), instance.morphs.end());
+    std::uint32_t target = instance.firstDrivenTarget;
+    for (const float weight : instance.drivenWeights) {
+      if (weight != 0) morphs.push_back({target, weight});
+      ++target;
+    }
+    instance.morphs = std::span<const MorphWeight>(morphs).subspan(first);
+  }
+  return memory.drivenInstances;
+}
+
+}  // namespace
+
 void skinTask(const Task& task) {
   for (const TaskInstance& instance : task.instances) {
     if (instance.figure != nullptr) instance.figure->finish();
+    if (instance.rig != nullptr) instance.rig->finish();
   }
-  dispatchTask(task, threadMemory().scratch);
+  Task complete = task;
+  if (std::ranges::any_of(task.instances, [](const TaskInstance& instance) {
+        return !instance.drivenWeights.empty();
+      }))
+    complete.instances = withDrivenTargets(task.instances);
+  dispatchTask(complete, threadMemory().scratch);
 }
 
 Result<void> skin(const Job& job) {

@@ -11,6 +11,7 @@
 #include "clips/sample.h"
 #include "cpu/mesh_data.h"
 #include "dermis/cpu.h"
+#include "dermis/rig.h"
 
 namespace dermis::cpu {
 
@@ -32,28 +33,98 @@ struct Scratch {
 
 struct ClipPlan;
 
+/// Work of which several tasks need the result: the first of them does it.
+class SharedWork {
+ public:
+  /// Nobody may need it meanwhile.
+  void restart() { state_.store(State::waiting, std::memory_order_relaxed); }
+
+  /// Returns when the work has been done. Any number of threads may call it. `prepare` is called
+  /// before, and may be called in vain.
+  template <typename Prepare, typename Work>
+  void finish(const Prepare& prepare, const Work& work) {
+    State found = state_.load(std::memory_order_acquire);
+    if (found == State::waiting) {
+      prepare();
+      if (state_.compare_exchange_strong(found, State::busy, std::memory_order_acquire)) {
+        work();
+        state_.store(State::done, std::memory_order_release);
+        state_.notify_all();
+        return;
+      }
+    }
+    while (found != State::done) {
+      state_.wait(found, std::memory_order_acquire);
+      found = state_.load(std::memory_order_acquire);
+    }
+  }
+
+ private:
+  enum class State : std::uint32_t { waiting, busy, done };
+  std::atomic<State> state_ = State::waiting;
+};
+
 /// A figure, whose poses are sampled by the first task that needs one of them.
 struct FigureTask {
-  enum class State : std::uint32_t { waiting, busy, done };
-
   const ClipPlan* plan = nullptr;
   PackedLayers layers;
   std::span<JointMatrix> matrices;  ///< of all skins
-  std::atomic<State> state = State::waiting;
+  SharedWork work;
 
-  /// Returns when the poses have been sampled. Any number of threads may call it.
   void finish();
 };
+
+/// A pose of a rig, whose sizes are those that the rig says.
+struct RigPose {
+  std::span<const JointMatrix> written;
+  std::span<const float> givenWeights;  ///< may be the first of `weights`
+  std::span<JointMatrix> driven;
+  std::span<float> weights;
+};
+
+/// As many poses of a rig as the widest vectors hold, or fewer. What the rig drives is computed by
+/// the first task that needs one of them.
+struct RigTask {
+  static constexpr std::size_t most = 16;
+
+  const PackedRig* rig = nullptr;
+  /// The driven joints of each are behind memory for a copy of the written ones.
+  std::array<RigPose, most> poses;
+  /// Of each pose: what samples its written joints and given weights; may be null.
+  std::array<FigureTask*, most> figures{};
+  std::size_t count = 0;
+  SharedWork work;
+
+  void finish();
+};
+
+/// Memory of a thread that evaluates rigs.
+struct RigScratch {
+  std::vector<CacheLine> numbers;  ///< a vector in each line
+
+  void prepare(const PackedRig& rig);
+};
+
+/// Computes what a rig drives in these poses, with the bits of `evaluateRig`. `scratch` was
+/// prepared for the rig. Uses the instruction set that `dispatchTask` uses.
+void dispatchRigs(const PackedRig& rig, std::span<const RigPose> poses, RigScratch& scratch);
+
+/// The same by the code of core.
+void evaluatePlainly(const PackedRig& rig, std::span<const RigPose> poses, RigScratch& scratch);
 
 /// Counterpart of `Instance`.
 struct TaskInstance {
   std::span<const JointMatrix> pose;
   FigureTask* figure = nullptr;  ///< to be finished before the pose is read
+  RigTask* rig = nullptr;        ///< the same
   /// Address of each attribute of the mesh's first vertex, indexed by `Stream`.
   ByStream<std::byte*> outputs{};
   bool mayScale = true;  ///< whether its promise is `JointPromise::scaling`
   bool restartsMotion = false, settles = false;
   std::span<const MorphWeight> morphs;  ///< in ascending order of targets
+  /// Of the targets after those, from `firstDrivenTarget` on: weights that `rig` computes.
+  std::span<const float> drivenWeights;
+  std::uint32_t firstDrivenTarget = 0;
   InstanceResult* result = nullptr;
   float boxCenter[3] = {}, boxInverse[3] = {};  ///< for snorm16 positions; `boxInverse` is 1 / half
                                                 ///< the size

@@ -10,8 +10,11 @@ namespace dermis::cpu {
 
 struct ThreadMemory {
   std::vector<TaskInstance> instances;
-  Scratch scratch[3];  ///< as `dispatchTask` takes it
+  std::vector<TaskInstance> drivenInstances;  ///< copies …
+  std::vector<MorphWeight> drivenMorphs;      ///< … and all their targets
+  Scratch scratch[3];                         ///< as `dispatchTask` takes it
   ClipScratch clips;
+  RigScratch rigs;
 };
 
 /// That of this thread; it is freed when the thread ends.
