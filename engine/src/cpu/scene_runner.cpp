@@ -51,6 +51,12 @@ DeviceLimits limitsOfMemory() {
   return limits;
 }
 
+/// The floats behind the first matrices of a pose's memory.
+std::span<float> weightsBehind(std::span<JointMatrix> memory, std::size_t joints) {
+  const std::span<JointMatrix> rest = memory.subspan(joints);
+  return {reinterpret_cast<float*>(rest.data()), rest.size_bytes() / sizeof(float)};
+}
+
 }  // namespace
 
 struct SceneRunner::State {
@@ -61,6 +67,7 @@ struct SceneRunner::State {
   std::span<std::byte> memoryOf(std::uint32_t buffer);
   TaskInstance taskInstance(const Work::Instance& instance, const Group& group);
   void placeFigures();
+  void placeRigs();
   void placeInstances(const Work& work);
   void addGroup(const Group& group, std::uint64_t verticesPerJob);
   void addInstances(const Task& task, std::size_t first, std::size_t count,
@@ -83,6 +90,9 @@ struct SceneRunner::State {
   std::span<std::byte> output;                        ///< of the frame
 
   std::deque<FigureTask> figures;  ///< that the frame samples, and more
+  std::deque<RigTask> rigs;        ///< that the frame evaluates, and more
+  std::vector<RigTask*> openRigs;  ///< of each rig: the task to which poses are added
+  std::vector<RigTask*> rigOf;     ///< of each pose whose rig the frame evaluates
   std::vector<TaskInstance> instances;
   std::vector<std::uint32_t> resultOf;  ///< of each instance: index of its result, or `noResult`
   /// A task's result for an instance. Other tasks may skin other vertices of the same instance.
@@ -204,6 +214,7 @@ Result<std::span<const PlannedJob>> SceneRunner::jobs(std::uint32_t verticesPerJ
                 static_cast<std::size_t>(move.size));
   }
   state.placeFigures();
+  state.placeRigs();
   state.placeInstances(books.work_);
   state.tasks.clear();
   state.extents.clear();
@@ -232,10 +243,57 @@ void SceneRunner::State::placeFigures() {
   }
 }
 
+/// What a rig drives is in memory behind a copy of the written joints.
+void SceneRunner::State::placeRigs() {
+  rigOf.resize(books().poses_.capacity());
+  openRigs.assign(books().rigs_.capacity(), nullptr);
+  std::size_t used = 0;
+  for (const std::uint32_t index : books().driving_) {
+    const ScenePose& pose = books().poses_.at(index);
+    const PackedRig& rig = *books().rigs_.at(pose.rig).rig;
+    RigTask*& task = openRigs[pose.rig];
+    if (task == nullptr || task->count == RigTask::most) {
+      if (used == rigs.size()) rigs.emplace_back();
+      task = &rigs[used++];
+      task->rig = &rig;
+      task->count = 0;
+      task->work.restart();
+    }
+    const std::size_t written = pose.writtenJoints, given = rig.givenWeights();
+    const std::span<JointMatrix> source = books().matricesOf(pose), all = books().drivenOf(pose);
+    const auto weights = weightsBehind(all, pose.jointCount).first(given + rig.drivenWeights());
+    RigPose& own = task->poses[task->count];
+    own.written = source.first(written);
+    own.driven = all.subspan(written, rig.drivenJoints());
+    own.weights = weights;
+    if (pose.figure != notUsed) {
+      task->figures[task->count] = &figures[books().figures_.at(pose.figure).place];
+      own.givenWeights = weights.first(given);
+    } else {
+      task->figures[task->count] = nullptr;
+      own.givenWeights = weightsBehind(source, written).first(given);
+    }
+    ++task->count;
+    rigOf[index] = task;
+  }
+}
+
 TaskInstance SceneRunner::State::taskInstance(const Work::Instance& instance, const Group& group) {
   TaskInstance skinned;
   const ScenePose& pose = books().poses_.at(instance.pose);
   skinned.pose = books().matricesOf(pose);
+  if (pose.rig != notUsed) {
+    const std::span<JointMatrix> all = books().drivenOf(pose);
+    skinned.pose = all.first(pose.jointCount);
+    if (pose.drivenPlan == books().planNumber_) skinned.rig = rigOf[instance.pose];
+    if (instance.extras != nullptr && instance.extras->drivenMorphs != 0) {
+      const std::uint32_t count = instance.extras->drivenMorphs;
+      skinned.drivenWeights =
+          weightsBehind(all, pose.jointCount).subspan(instance.extras->firstDrivenWeight, count);
+      skinned.firstDrivenTarget =
+          dataOf(meshes.find(group.key.mesh)->second).info.morphTargetCount - count;
+    }
+  }
   skinned.mayScale = pose.promise == JointPromise::scaling;
   skinned.restartsMotion = (instance.flags & abi::INSTANCE_RESTARTS) != 0;
   skinned.settles = (instance.flags & abi::INSTANCE_SETTLES) != 0;

@@ -39,8 +39,9 @@ struct InstanceExtras {
   std::uint32_t result = notUsed;   ///< its number among the results
   Box box;
   bool hasBox = false;
-  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are made on the GPU …
-  std::uint32_t drivenMorphs = 0;   ///< … and those after them that a rig drives
+  std::uint32_t writtenMorphs = 0;      ///< targets whose weights are made on the GPU …
+  std::uint32_t drivenMorphs = 0;       ///< … and those after them that a rig drives, …
+  std::uint32_t firstDrivenWeight = 0;  ///< … by weights from this one on
 
   bool isNeeded() const {
     return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0 ||

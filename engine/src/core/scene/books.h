@@ -223,12 +223,12 @@ struct SceneInstance {
   PoseHandle poseHandle;
   bool bounds = false;
   MorphWriter morphWriter = MorphWriter::cpu;
-  std::uint32_t weightsOf = notUsed;                       ///< node of a skeleton
-  std::uint32_t drivenTargets = 0, firstDrivenWeight = 0;  ///< as in its description
-  std::uint32_t weightsBuffer = 0;  ///< of poses, that has the weights which the GPU writes …
-  Range weights;                    ///< … and where they are there, in joints
-  bool isWritten = false;           ///< `InstanceOutput::isWritten`
-  std::optional<Place> shown;       ///< where it was last recorded
+  std::uint32_t weightsOf = notUsed;  ///< node of a skeleton
+  std::uint32_t drivenTargets = 0;    ///< as in its description
+  std::uint32_t weightsBuffer = 0;    ///< of poses, that has the weights which the GPU writes …
+  Range weights;                      ///< … and where they are there, in joints
+  bool isWritten = false;             ///< `InstanceOutput::isWritten`
+  std::optional<Place> shown;         ///< where it was last recorded
 
   const Place& place() const { return shown ? *shown : target; }
 };

@@ -257,7 +257,8 @@ void SceneBooks::listMorphs(const SceneInstance& instance) {
   if (drivenCount != 0) {
     const ScenePose& pose = poses_.at(instance.pose);
     list.drivenBuffer = pose.drivenBuffer;
-    list.record.driven = static_cast<std::uint32_t>(drivenWord(pose, instance.firstDrivenWeight));
+    list.record.driven =
+        static_cast<std::uint32_t>(drivenWord(pose, instance.extras.firstDrivenWeight));
     list.record.firstDriven = meshes_.at(instance.mesh.index).info.morphTargetCount - drivenCount;
     list.record.drivenCount = drivenCount;
   }

@@ -91,8 +91,8 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
     } else {
       work_.add(skinned);
     }
-    const bool isSkinned = (flags & abi::INSTANCE_SETTLES) == 0;
-    if (isSkinned && instance.extras.writtenMorphs + instance.extras.drivenMorphs != 0)
+    const bool isListed = (flags & abi::INSTANCE_SETTLES) == 0 && !owner_.isCpu;
+    if (isListed && instance.extras.writtenMorphs + instance.extras.drivenMorphs != 0)
       listMorphs(instance);
   };
   add(instance.run);

@@ -61,9 +61,9 @@ Result<void> SceneBooks::checkDrivenTargets(const SceneInstance& instance, const
   if (count == 0 || pose.rig == notUsed) return {};
   const PackedRig& rig = *rigs_.at(pose.rig).rig;
   const std::uint64_t weights = std::uint64_t{rig.givenWeights()} + rig.drivenWeights();
-  if (instance.firstDrivenWeight + count <= weights) return {};
+  if (instance.extras.firstDrivenWeight + count <= weights) return {};
   return invalid("the instance has " + std::to_string(count) + " driven targets from weight " +
-                 std::to_string(instance.firstDrivenWeight) + " on, but its rig has " +
+                 std::to_string(instance.extras.firstDrivenWeight) + " on, but its rig has " +
                  std::to_string(weights) + " weights");
 }
 
@@ -317,8 +317,8 @@ Result<InstanceHandle> Scene::addInstance(const InstanceDescription& description
   instance.morphWriter = description.morphWriter;
   instance.weightsOf = description.weightsOf;
   instance.drivenTargets = description.drivenTargets;
-  instance.firstDrivenWeight = description.firstDrivenWeight;
-  if (!books.owner_.isCpu) instance.extras.drivenMorphs = description.drivenTargets;
+  instance.extras.drivenMorphs = description.drivenTargets;
+  instance.extras.firstDrivenWeight = description.firstDrivenWeight;
   if (Result<void> good = books.check(instance, description.updateInterval); !good)
     return good.error();
   if (!books.hasSlot()) {
