@@ -93,7 +93,7 @@ TEST_P(CpuRigTest, BitsAreThoseOfCore) {
                               .segments = 5,
                               .linears = 3,
                               .isVaried = true});
-    for (const std::size_t poses : {0, 1, 3, 8, 21}) expectSameBits(made, poses, 6);
+    for (const std::size_t poses : {0u, 1u, 3u, 8u, 21u}) expectSameBits(made, poses, 6);
   }
 }
 

@@ -137,6 +137,19 @@ class GpuModelTest : public SystemTest,
     expectNear(sampled, playedPose(play, skin));
     return sampled;
   }
+  std::vector<JointMatrix> driveAlone(std::span<const JointMatrix> written) override {
+    SystemEngine lone(device(), *watched_, {});
+    const RigHandle rig = must(lone->addRig(smallRig()));
+    const PoseHandle pose = lone.addPose(written, {.rig = rig});
+    const MeshHandle mesh = lone.addMesh(must(pack(randomMesh(1, 3, 1, 1).view(), 1)));
+    lone.addInstance({.mesh = mesh, .pose = pose});
+    lone.runFrame();
+    std::vector<JointMatrix> all(written.begin(), written.end());
+    const Driven driven = lone.readDriven(pose, 3);
+    expectNear(driven.joints, evaluated(smallRig(), written, {}).joints);
+    all.insert(all.end(), driven.joints.begin(), driven.joints.end());
+    return all;
+  }
   /// As exact as float32 permits.
   static void expectNear(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {
     ASSERT_EQ(a.size(), b.size());
@@ -177,7 +190,7 @@ TEST_P(GpuModelTest, EveryStepGivesWhatTheModelSays) {
   run();
   std::set<std::string> texts = errorTexts("vulkan/recorder/frame.cpp");
   for (const char* file : {"meshes_and_poses.cpp", "figures.cpp", "frame.cpp", "instances.cpp",
-                           "slot_map.h", "stores.cpp"})
+                           "rigs.cpp", "slot_map.h", "stores.cpp"})
     texts.merge(errorTexts(std::string("core/scene/") + file));
   EXPECT_GT(texts.size(), 30u);
   std::erase_if(texts, isOfScenesOnly);

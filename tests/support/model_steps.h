@@ -1,6 +1,7 @@
 // Thousands of random steps of a scene beside a model of it: meshes, palettes, figures and
 // instances come and go, move, hide, find no room and are moved about while frames are under way,
-// buffers grow, frames are abandoned, the GPU writes some poses, others are sampled from clips, and
+// buffers grow, frames are abandoned, the GPU writes some poses, others are sampled from clips,
+// some have joints that a rig drives, and
 // every instance's output stays, bit for bit, what it would be alone. On the CPU, the same steps
 // without those that are the GPU's. Calls with bad arguments, and Vulkan calls that fail, change
 // nothing.
@@ -22,6 +23,7 @@
 
 #include "played_clips.h"
 #include "refused_calls.h"
+#include "rigged.h"
 #include "scene_meshes.h"
 #include "system_model.h"
 
@@ -35,6 +37,9 @@ inline constexpr std::uint32_t meshKinds = 8;
 // So small that they are full at times.
 inline constexpr Capacity outputCapacity{1024, 100 << 10}, instanceCapacity{4, 32};
 inline constexpr std::uint32_t boundsCapacity = 12;
+
+/// Numbers of poses: written ones, those of each play and skin, and from here on those with a rig.
+inline constexpr std::uint32_t riggedPoses = poseCount + playCount * playedSkins;
 
 /// What an instance's set of morph weights is if clips write them.
 inline constexpr std::uint32_t morphsOfClips = 3;
@@ -84,6 +89,8 @@ class ModelSteps {
   virtual std::uint64_t outputNow() = 0;
   /// The pose of the only figure of a scene, if it plays this (played_clips.h).
   virtual std::vector<JointMatrix> sampleAlone(std::uint32_t play, std::uint32_t skin) = 0;
+  /// All joints of the only pose of a scene with `smallRig`.
+  virtual std::vector<JointMatrix> driveAlone(std::span<const JointMatrix> written) = 0;
   /// An instance skinned alone.
   virtual Streams skinAlone(const PackedMesh& mesh, std::span<const JointMatrix> pose,
                             const InstanceDescription& description,
@@ -132,6 +139,8 @@ class ModelSteps {
     engine_->begin();
     narrow_ = must(system().addPose(1));
     for (ClipsHandle& clips : clips_) clips = must(system().addClips(playedClips()));
+    rig_ = must(system().addRig(smallRig()));
+    weightedRig_ = must(system().addRig(riggedPose(1, 2, weightedNode(3))));
   }
 
   Scene& system() { return engine_->scene(); }
@@ -165,17 +174,32 @@ class ModelSteps {
     if (model_->poses.size() >= 30) return;
     if (chance(25)) return addFigure();
     const std::uint32_t pose = below(poseCount);
-    const bool writtenByGpu = hasGpu && chance(40);
-    if (chance(30))
-      tryToAdd([&] { return system().addPose(8, {.writtenByGpu = writtenByGpu}); },
-               [&](PoseHandle added) { must(system().removePose(added)); });
-    const Result<PoseHandle> added = system().addPose(8, {.writtenByGpu = writtenByGpu});
+    const bool writtenByGpu = hasGpu && chance(40), isRigged = chance(30);
+    const PoseOptions options{.writtenByGpu = writtenByGpu, .rig = isRigged ? rig_ : RigHandle()};
+    const auto add = [&] { return system().addPose(isRigged ? smallWritten : 8, options); };
+    if (chance(30)) {
+      tryToAdd(add, [&](PoseHandle added) { must(system().removePose(added)); });
+      tryToAdd([&] { return system().addRig(smallRig()); },
+               [&](RigHandle added) { must(system().removeRig(added)); });
+    }
+    const Result<PoseHandle> added = add();
     if (!added) {  // places of palettes that went are not free yet
       messages_.insert(added.error().message);
       return;
     }
-    model_->poses[nextNumber_++] = {*added, pose};
-    engine_->writePose(*added, systemPose(pose));
+    ModelPose& made = model_->poses[nextNumber_++];
+    made.handle = *added;
+    made.isRigged = isRigged;
+    made.pose = numberOf(made, pose);
+    writePose(made, pose);
+  }
+  static std::uint32_t numberOf(const ModelPose& its, std::uint32_t pose) {
+    return its.isRigged ? riggedPoses + pose : pose;
+  }
+  void writePose(const ModelPose& its, std::uint32_t pose) {
+    const Pose matrices = systemPose(pose);
+    engine_->writePose(its.handle,
+                       std::span(matrices).first(its.isRigged ? smallWritten : matrices.size()));
   }
   void addFigure() {
     if (chance(30)) {
@@ -415,8 +439,8 @@ class ModelSteps {
     for (auto& [number, palette] : model_->poses) {
       if (palette.figure || !chance(moving)) continue;
       const std::uint32_t pose = below(poseCount);
-      engine_->writePose(palette.handle, systemPose(pose));
-      model_->writePose(number, pose);
+      writePose(palette, pose);
+      model_->writePose(number, numberOf(palette, pose));
     }
     if (chance(15)) compact();
     if (chance(15)) {
@@ -525,6 +549,7 @@ class ModelSteps {
                    gone_.empty() ? InstanceHandle() : gone_[below(gone_.size())], narrow_});
     addRefusedCalls(calls);
     addRefusedClips(calls);
+    addRefusedRigs(calls, description);
     refuseOne(calls);
   }
 
@@ -557,6 +582,38 @@ class ModelSteps {
     play(pose.figure, {{}, {.mask = 2}});
     play(pose.figure, {{.time = NAN}});
     play(pose.figure, std::vector<ClipLayer>(maxClipLayers + 1));
+  }
+
+  void addRefusedRigs(std::vector<RefusedCall>& calls, const InstanceDescription& description) {
+    const auto add = [&](auto call) { calls.push_back({[call] { return withoutValue(call()); }}); };
+    Scene& scene = system();
+    add([&scene] { return scene.removeRig({7777, 1}); });
+    add([&scene, rig = rig_] { return scene.addPose(8, {.rig = rig}); });
+    add([&scene] { return scene.addPose(8, {.rig = {7777, 1}}); });
+    const auto addFigure = [&](std::vector<RigHandle> rigs) {
+      add([&scene, rigs, clips = clips_[0]] { return scene.addFigure(clips, rigs); });
+    };
+    addFigure({rig_});
+    addFigure({rig_, {}});
+    addFigure({{}, weightedRig_});
+    const auto addInstance = [&](PoseHandle pose, std::uint32_t targets, std::uint32_t weight) {
+      InstanceDescription wrong = description;
+      wrong.pose = pose;
+      wrong.morphWriter = MorphWriter::cpu;
+      wrong.drivenTargets = targets;
+      wrong.firstDrivenWeight = weight;
+      add([&scene, wrong] { return scene.addInstance(wrong); });
+    };
+    addInstance(description.pose, 9, 0);
+    if constexpr (hasGpu) {
+      static const PackedRig large = longRig(40'000);
+      add([&scene] { return scene.addRig(PackedRig(large)); });
+    }
+    const auto found =
+        std::ranges::find_if(model_->poses, [](const auto& pose) { return pose.second.isRigged; });
+    if (found == model_->poses.end()) return;
+    add([&scene, rig = rig_] { return scene.removeRig(rig); });
+    addInstance(found->second.handle, 1, 0);
   }
 
   /// Between `record` and `abandonFrame`, when poses cannot be written.
@@ -634,7 +691,7 @@ class ModelSteps {
     std::vector<MorphWeight> morphs;
     if (shown.morphs != morphsOfClips) {
       morphs = morphSets[shown.morphs];
-    } else if (shown.pose >= poseCount) {
+    } else if (shown.pose >= poseCount && shown.pose < riggedPoses) {
       morphs = playedMorphs((shown.pose - poseCount) / playedSkins, targetsOf(shown.mesh));
     }
     return streams = skinAlone(kinds_[kind], matricesOf(shown.pose), description, morphs);
@@ -656,6 +713,10 @@ class ModelSteps {
     std::vector<JointMatrix>& matrices = matrices_[pose];
     if (!matrices.empty()) return matrices;
     if (pose < poseCount) return matrices = systemPose(pose);
+    if (pose >= riggedPoses) {
+      const Pose written = systemPose(pose - riggedPoses);
+      return matrices = driveAlone(std::span(written).first(smallWritten));
+    }
     return matrices =
                sampleAlone((pose - poseCount) / playedSkins, (pose - poseCount) % playedSkins);
   }
@@ -705,6 +766,7 @@ class ModelSteps {
   std::map<std::uint32_t, std::uint32_t> kindOf_;  ///< of every mesh that ever was
   std::vector<InstanceHandle> gone_;
   PoseHandle narrow_;
+  RigHandle rig_, weightedRig_;
   std::array<ClipsHandle, 2> clips_;                            ///< the same twice
   std::map<std::uint32_t, std::vector<JointMatrix>> matrices_;  ///< of poses
   std::map<std::tuple<ShownPose, VertexFormat, VertexFormat>, Streams> expected_;

@@ -77,6 +77,29 @@ PackedRig riggedPose(std::uint32_t seed, std::uint32_t given, std::uint32_t weig
                        .linears = linears}));
 }
 
+PackedRig smallRig() {
+  std::vector<RigJoint> joints(smallWritten + 3);
+  for (std::uint32_t joint = 0; joint < joints.size(); ++joint) {
+    if (joint != 0) joints[joint].parent = joint < smallWritten ? joint - 1 : joint - smallWritten;
+    joints[joint].bind.m[0][3] = 0.4f * static_cast<float>(joint % smallWritten);
+  }
+  const std::array twists{TwistDriver{.joint = smallWritten, .source = 2}};
+  const std::array<std::uint32_t, 3> chainJoints{0, 1, 2};
+  const std::array chains{
+      ChainDriver{.joints = chainJoints, .firstDriven = smallWritten + 1, .segments = 3}};
+  return must(packRig(
+      {.joints = joints, .writtenJoints = smallWritten, .twists = twists, .chains = chains}));
+}
+
+PackedRig longRig(std::uint32_t terms) {
+  const std::array<RigJoint, 2> joints;
+  const std::vector<std::uint32_t> weights(terms);
+  const std::vector<JointMatrix> matrices(terms);
+  const std::array linears{LinearDriver{.joint = 1, .weights = weights, .matrices = matrices}};
+  return must(
+      packRig({.joints = joints, .writtenJoints = 1, .givenWeights = 1, .linears = linears}));
+}
+
 Driven evaluated(const PackedRig& rig, std::span<const JointMatrix> written,
                  std::span<const float> given) {
   Driven driven{std::vector<JointMatrix>(rig.drivenJoints()),

@@ -18,6 +18,13 @@ inline constexpr std::uint32_t drivenWeights = 5;
 PackedRig riggedPose(std::uint32_t seed = 1, std::uint32_t given = givenWeights,
                      std::uint32_t weightsOf = 0xffffffffu);
 
+/// A rig of five written joints and three driven ones, without weights.
+PackedRig smallRig();
+inline constexpr std::uint32_t smallWritten = 5;
+
+/// One whose linear driver has so many terms, of 64 bytes.
+PackedRig longRig(std::uint32_t terms);
+
 /// What a rig drives.
 struct Driven {
   std::vector<JointMatrix> joints;

@@ -77,13 +77,14 @@ std::vector<JointMatrix> SystemEngine::readPose(PoseHandle handle) {
   return pose;
 }
 
-Driven SystemEngine::readDriven(PoseHandle handle) {
+Driven SystemEngine::readDriven(PoseHandle handle, std::uint32_t joints) {
   const std::vector<std::byte> bytes = readRange(must(recorder_.drivenRange(handle)));
-  constexpr std::size_t joints = drivenJoints * sizeof(JointMatrix);
-  Driven driven{std::vector<JointMatrix>(drivenJoints),
-                std::vector<float>((bytes.size() - joints) / sizeof(float))};
-  std::memcpy(driven.joints.data(), bytes.data(), joints);
-  std::memcpy(driven.weights.data(), bytes.data() + joints, bytes.size() - joints);
+  const std::size_t size = joints * sizeof(JointMatrix);
+  Driven driven{std::vector<JointMatrix>(joints),
+                std::vector<float>((bytes.size() - size) / sizeof(float))};
+  std::memcpy(driven.joints.data(), bytes.data(), size);
+  if (bytes.size() != size)
+    std::memcpy(driven.weights.data(), bytes.data() + size, bytes.size() - size);
   return driven;
 }
 

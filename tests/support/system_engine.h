@@ -84,8 +84,8 @@ class SystemEngine {
 
   /// A pose that the GPU writes, or that belongs to a figure.
   std::vector<JointMatrix> readPose(PoseHandle pose);
-  /// What the rig of a pose drives.
-  Driven readDriven(PoseHandle pose);
+  /// What the rig of a pose drives: so many joints.
+  Driven readDriven(PoseHandle pose, std::uint32_t joints = drivenJoints);
   /// Submits what `record` records, and waits for it and all before.
   void submitNow(const std::function<void(VkCommandBuffer)>& record);
   void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Barrier& barrier) const;

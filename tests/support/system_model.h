@@ -32,6 +32,7 @@ struct ModelPose {
   FigureHandle figure = {};  ///< null: somebody writes it
   std::uint32_t skin = 0;    ///< of the figure
   std::uint32_t clips = 0;   ///< number of its bank
+  bool isRigged = false;     ///< `pose` is a number of a pose with driven joints
 };
 
 struct ModelInstance {
