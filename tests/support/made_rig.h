@@ -163,7 +163,9 @@ class MadeRig {
     std::vector<float> weights;
     std::vector<JointOffset> offsets;
     for (std::uint32_t i = 0; i < size_.inputs; ++i) inputs.push_back(readable());
-    for (std::uint32_t i = 0; i < size_.offsetJoints; ++i) joints.push_back(addDriven(readable()));
+    // None is below another one that the same driver drives.
+    for (std::uint32_t i = 0; i < size_.offsetJoints; ++i) joints.push_back(readable());
+    for (std::uint32_t& joint : joints) joint = addDriven(joint);
     for (std::uint32_t i = 0; i < size_.examples; ++i) {
       for (std::uint32_t input = 0; input < size_.inputs; ++input) examples.push_back(turn());
       for (std::uint32_t weight = 0; weight < size_.weights; ++weight)
