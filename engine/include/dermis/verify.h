@@ -13,6 +13,7 @@
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 
 // ---- The CPU reference: it defines the right answer, in double precision. It starts from the same
 // mesh views and float32 joint matrices as the GPU, and shares no code with packing or the kernels.
@@ -134,6 +135,27 @@ DERMIS_VERIFY_API Result<SampledWeights> sampleWeights(
     const Skeleton& skeleton, std::span<const ClipView> clips,
     std::span<const std::span<const float>> masks, std::span<const ClipLayer> layers,
     std::uint32_t node, const PackedClips* bank = nullptr);
+
+/// What `evaluateRig` returns.
+struct EvaluatedRig {
+  std::vector<Transform> joints;  ///< driven joint matrices
+  std::vector<double> weights;    ///< all, the given ones first
+  /// How far each number in float32 may be from it. Infinite if rounding decides the result: a
+  /// matrix is singular, a twist is near 180 degrees or a swing is; between two joints of a chain
+  /// the rotation is near 180 degrees, or the curve runs against it; or numbers leave the range of
+  /// float32.
+  std::vector<Transform> jointBounds;
+  std::vector<double> weightBounds;  ///< the same; 0 for the given ones
+};
+
+/// Computes what a rig drives from its source, as `dermis::evaluateRig` and the kernels do from the
+/// packed rig. The bounds are derived: docs/accuracy.md.
+///
+/// Fails with `invalidArgument` if a span does not have the size that the rig says, and if
+/// `packRig` refuses the rig.
+DERMIS_VERIFY_API Result<EvaluatedRig> evaluateRig(const RigView& rig,
+                                                   std::span<const JointMatrix> written,
+                                                   std::span<const float> givenWeights = {});
 
 }  // namespace dermis::reference
 
