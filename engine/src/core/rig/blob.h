@@ -53,7 +53,7 @@ struct RigTwist {
   std::uint32_t driven, parent;
   float share;
   std::uint32_t unused;
-  float axis[4];       ///< unit, in the axes of the joint of the sensor
+  float axis[4];       ///< unit, in the axes of the sensor's rotation
   float direction[4];  ///< the same in bind space
   float origin[4];     ///< of the driven joint in bind space
 };

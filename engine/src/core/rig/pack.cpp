@@ -44,13 +44,17 @@ Matrix matrixFrom(const JointMatrix& joint) {
   return matrix;
 }
 
+Vec3 rowOf(const Matrix& m, std::size_t row) {
+  return {m[row][0], m[row][1], m[row][2]};
+}
+
 /// None if the determinant is 0 beside the lengths of the rows.
 std::optional<Matrix> inverseOf(const Matrix& m) {
-  const auto row = [&](std::size_t i) { return Vec3(m[i][0], m[i][1], m[i][2]); };
-  const Vec3 columns[3] = {math::cross(row(1), row(2)), math::cross(row(2), row(0)),
-                           math::cross(row(0), row(1))};
-  const double determinant = math::dot(row(0), columns[0]);
-  const double size = math::length(row(0)) * math::length(row(1)) * math::length(row(2));
+  const Vec3 rows[3] = {rowOf(m, 0), rowOf(m, 1), rowOf(m, 2)};
+  const Vec3 columns[3] = {math::cross(rows[1], rows[2]), math::cross(rows[2], rows[0]),
+                           math::cross(rows[0], rows[1])};
+  const double determinant = math::dot(rows[0], columns[0]);
+  const double size = math::length(rows[0]) * math::length(rows[1]) * math::length(rows[2]);
   if (!(std::abs(determinant) > 1e-9 * size)) return {};
   Matrix inverse;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -191,20 +195,24 @@ class RigPacker {
         return invalid("the bind matrix of joint " + std::to_string(joint) +
                        " has a number that is not finite");
       }
+      if (record.parent != abi::RIG_NO_JOINT && record.parent >= count) {
+        return invalid("joint " + std::to_string(record.parent) + ", the parent of joint " +
+                       std::to_string(joint) + ", does not exist");
+      }
+    }
+    std::vector<bool> hasRoot(count);  // it is not part of a cycle, nor below one
+    for (std::uint32_t joint = 0; joint < count; ++joint) {
       std::size_t steps = 0;
-      for (std::uint32_t above = record.parent; above != abi::RIG_NO_JOINT;
+      for (std::uint32_t above = joint; above != abi::RIG_NO_JOINT && !hasRoot[above];
            above = rig_.joints[above].parent) {
-        if (above >= count) {
-          return invalid("joint " + std::to_string(above) +
-                         ", the parent of another one, does not exist");
-        }
         if (++steps > count) {
           return invalid("joint " + std::to_string(joint) +
                          " is part of, or below, a cycle of parents");
         }
-        if (steps > 1 && above == joint)
-          return invalid("joint " + std::to_string(joint) + " is part of a cycle of parents");
       }
+      for (std::uint32_t above = joint; above != abi::RIG_NO_JOINT && !hasRoot[above];
+           above = rig_.joints[above].parent)
+        hasRoot[above] = true;
     }
     return {};
   }
@@ -381,15 +389,20 @@ class RigPacker {
                    " has no inverse");
   }
 
-  Result<RigSensor> sensorOf(std::uint32_t joint, const std::string& title) const {
-    RigSensor sensor{};
-    sensor.joint = joint;
-    sensor.parent = rig_.joints[joint].parent;
+  struct Sensor {
+    RigSensor record;
+    Matrix local;     ///< the bind matrix relative to the parent, in its own orthonormal columns
+    bool isMirrored;  ///< the parent is, in bind pose
+  };
+  Result<Sensor> sensorOf(std::uint32_t joint, const std::string& title) const {
+    Sensor sensor{};
+    sensor.record.joint = joint;
+    sensor.record.parent = rig_.joints[joint].parent;
     const Matrix bind = matrixFrom(rig_.joints[joint].bind);
     if (const Result<Matrix> inverse = invertBind(joint, title); !inverse) return inverse.error();
     Matrix above{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-    if (sensor.parent != abi::RIG_NO_JOINT) {
-      const Result<Matrix> inverse = invertBind(sensor.parent, title);
+    if (sensor.record.parent != abi::RIG_NO_JOINT) {
+      const Result<Matrix> inverse = invertBind(sensor.record.parent, title);
       if (!inverse) return inverse.error();
       above = *inverse;
     }
@@ -397,29 +410,36 @@ class RigPacker {
     Matrix back{};
     for (std::size_t row = 0; row < 3; ++row)
       back[row] = {axes[row].x, axes[row].y, axes[row].z, 0};
-    dermis::put(sensor.left, multiply(back, above), false);
-    dermis::put(sensor.right, bind, false);
+    const Matrix left = multiply(back, above);
+    dermis::put(sensor.record.left, left, false);
+    dermis::put(sensor.record.right, bind, false);
+    sensor.local = multiply(left, bind);
+    sensor.isMirrored =
+        math::dot(rowOf(above, 0), math::cross(rowOf(above, 1), rowOf(above, 2))) < 0;
     return sensor;
   }
 
   Result<RigDriver> writeTwist(const TwistDriver& view, const std::string& title) {
     const Vec3 axis(double{view.axis[0]}, double{view.axis[1]}, double{view.axis[2]});
-    const double length = math::length(axis);
-    if (!areFinite(view.axis) || !(length > 0))
+    if (!areFinite(view.axis) || !(math::length(axis) > 0))
       return invalid(title + ": the axis has no direction");
     if (!(std::abs(view.share) <= 1)) return invalid(title + ": the share is not from -1 to 1");
-    const Result<RigSensor> sensor = sensorOf(view.source, title);
+    const Result<Sensor> sensor = sensorOf(view.source, title);
     if (!sensor) return sensor.error();
     RigTwist twist{};
-    twist.sensor = *sensor;
+    twist.sensor = sensor->record;
     twist.driven = placeOf(view.joint);
     twist.parent = rig_.joints[view.joint].parent;
     twist.share = view.share;
-    dermis::put(twist.axis, axis / length);
-    const Matrix bind = matrixFrom(rig_.joints[view.source].bind);
-    const auto row = [&](std::size_t i) { return Vec3(bind[i][0], bind[i][1], bind[i][2]); };
-    const Vec3 direction(math::dot(row(0), axis), math::dot(row(1), axis), math::dot(row(2), axis));
-    dermis::put(twist.direction, direction / math::length(direction));
+    const auto unitAlong = [&](const Matrix& m) {
+      const Vec3 v(math::dot(rowOf(m, 0), axis), math::dot(rowOf(m, 1), axis),
+                   math::dot(rowOf(m, 2), axis));
+      return v / math::length(v);
+    };
+    dermis::put(twist.axis, unitAlong(sensor->local));
+    const Vec3 direction = unitAlong(matrixFrom(rig_.joints[view.source].bind));
+    // Seen in a mirror, a rotation has the other sense.
+    dermis::put(twist.direction, sensor->isMirrored ? -direction : direction);
     const auto& own = rig_.joints[view.joint].bind.m;
     dermis::put(twist.origin, {double{own[0][3]}, double{own[1][3]}, double{own[2][3]}});
     const auto data = static_cast<std::uint32_t>(words_.size());
@@ -464,8 +484,8 @@ Result<void> RigPacker::checkCorrective(const CorrectiveDriver& view,
   if (!(view.radius >= 0) || !std::isfinite(view.radius))
     return invalid(title + ": the radius is negative or not finite");
   if (view.radius > 0 &&
-      !std::isfinite(static_cast<float>(-0.5 / (double{view.radius} * view.radius))))
-    return invalid(title + ": the radius is too small for float32");
+      !std::isnormal(static_cast<float>(-0.5 / (double{view.radius} * view.radius))))
+    return invalid(title + ": the radius is too small or too large for float32");
   if (view.weights.size() != std::uint64_t{examples} * view.weightCount ||
       view.offsets.size() != examples * view.joints.size()) {
     return invalid(title + " has " + std::to_string(view.weights.size()) + " weights and " +
@@ -514,9 +534,9 @@ Result<RigDriver> RigPacker::writeCorrective(const CorrectiveDriver& view,
   const auto data = static_cast<std::uint32_t>(words_.size());
   append(record);
   for (const std::uint32_t joint : view.inputs) {
-    const Result<RigSensor> sensor = sensorOf(joint, title);
+    const Result<Sensor> sensor = sensorOf(joint, title);
     if (!sensor) return sensor.error();
-    append(*sensor);
+    append(sensor->record);
   }
   std::vector<Vec4> rotations;
   for (const std::array<float, 4>& rotation : view.examples) {
@@ -683,6 +703,8 @@ Result<RigDriver> RigPacker::writeLinear(const LinearDriver& view, const std::st
 Result<PackedRig> packRig(const RigView& rig) {
   Result<std::vector<std::uint32_t>> words = RigPacker(rig).run();
   if (!words) return words.error();
+  if (!checkRig(*words))
+    return invalid("a bind matrix, or what follows from it, is too large for float32");
   PackedRig packed;
   packed.words_ = std::move(*words);
   return packed;
