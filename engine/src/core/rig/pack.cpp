@@ -252,8 +252,8 @@ class RigPacker {
         return curve.error();
       driver.reads.assign(chain.joints.begin(), chain.joints.end());
       for (std::uint32_t joint = 0; joint + 1 < chain.segments; ++joint) {
-        if (chain.firstDriven > maxPoseJoints) break;
         driver.drives.push_back(chain.firstDriven + joint);
+        if (chain.firstDriven > maxPoseJoints) break;  // it is refused
       }
     }
     for (std::size_t i = 0; i < rig_.linears.size(); ++i) {
