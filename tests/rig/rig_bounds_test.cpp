@@ -1,0 +1,191 @@
+// What a rig drives is as near to the reference as the reference says, in the arithmetic of the CPU
+// and in one as inexact as Vulkan allows.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dermis/verify.h"
+#include "made_rig.h"
+#include "random_number.h"
+#include "rig/blob.h"
+
+namespace dermis::test {
+namespace {
+
+/// float32 on a GPU that flushes denormals, and whose divisions and square roots are off by what
+/// Vulkan allows before the kernels' step of Newton's method (shaders/exact.glsl). Which way they
+/// are off follows from the bits of the result.
+namespace kernel_arithmetic {
+
+float flushed(float value) {
+  return std::abs(value) < 0x1p-126f ? std::copysign(0.0f, value) : value;
+}
+float off(float value, float units) {
+  const bool isUp = std::popcount(std::bit_cast<std::uint32_t>(value) * 0x9e3779b1u) % 2 == 0;
+  return value * (1 + (isUp ? units : -units) * 0x1p-23f);
+}
+
+struct Inexact {
+  float value = 0;
+  Inexact() = default;
+  explicit Inexact(float number) : value(flushed(number)) {}
+
+  friend Inexact operator+(Inexact a, Inexact b) { return Inexact(a.value + b.value); }
+  friend Inexact operator-(Inexact a, Inexact b) { return Inexact(a.value - b.value); }
+  friend Inexact operator*(Inexact a, Inexact b) { return Inexact(a.value * b.value); }
+  friend Inexact operator-(Inexact a) { return Inexact(-a.value); }
+  friend Inexact operator/(Inexact a, Inexact b) {
+    const Inexact guess(off(a.value / b.value, 2.5f));
+    const Inexact step(off((a - guess * b).value / b.value, 2.5f));
+    return guess + step;
+  }
+  friend bool operator<(Inexact a, Inexact b) { return a.value < b.value; }
+  friend bool operator>(Inexact a, Inexact b) { return a.value > b.value; }
+};
+
+Inexact squareRoot(Inexact square) {
+  const float root = std::sqrt(square.value);
+  if (square.value < 1e-37f) return Inexact(0);
+  const Inexact guess(off(root, 4.5f));
+  return guess + Inexact(0.5f) * Inexact(off((square - guess * guess).value / guess.value, 2.5f));
+}
+Inexact floorOf(Inexact number) {
+  return Inexact(std::floor(number.value));
+}
+Inexact select(bool condition, Inexact a, Inexact b) {
+  return condition ? a : b;
+}
+Inexact powerOfTwo(Inexact exponent) {
+  return Inexact(std::ldexp(1.0f, static_cast<int>(exponent.value)));
+}
+
+#include "rig/evaluate_inl.h"
+
+struct PoseMemory {
+  std::vector<Transform<Inexact>> joints;
+  std::size_t written;
+  std::vector<Inexact> weights;
+
+  Transform<Inexact> joint(std::size_t number) const { return joints[number]; }
+  void setDriven(std::size_t number, const Transform<Inexact>& t) { joints[written + number] = t; }
+  Inexact weight(std::size_t number) const { return weights[number]; }
+  void setWeight(std::size_t number, Inexact value) { weights[number] = value; }
+};
+
+DrivenPose evaluate(const PackedRig& rig, std::span<const JointMatrix> written,
+                    std::span<const float> givenWeights) {
+  const RigBlob blob(rig);
+  PoseMemory memory{{}, written.size(), {}};
+  for (const JointMatrix& matrix : written)
+    memory.joints.push_back(transformFrom<Inexact>(matrix.m));
+  memory.joints.resize(written.size() + rig.drivenJoints());
+  for (const float weight : givenWeights) memory.weights.emplace_back(weight);
+  memory.weights.resize(givenWeights.size() + rig.drivenWeights());
+  std::vector<Quat<Inexact>> rotations(blob.header.mostInputs);
+  std::vector<Inexact> basis(maxRigExamples);
+  evaluateDrivers<Inexact>(blob, rotations, basis, memory);
+  DrivenPose pose;
+  for (std::size_t i = written.size(); i < memory.joints.size(); ++i) {
+    const Linear<Inexact>& m = memory.joints[i].linear;
+    const Vec<Inexact>& shift = memory.joints[i].shift;
+    pose.joints.push_back({{{m.r0.x.value, m.r0.y.value, m.r0.z.value, shift.x.value},
+                            {m.r1.x.value, m.r1.y.value, m.r1.z.value, shift.y.value},
+                            {m.r2.x.value, m.r2.y.value, m.r2.z.value, shift.z.value}}});
+  }
+  for (const Inexact& weight : memory.weights) pose.weights.push_back(weight.value);
+  return pose;
+}
+
+}  // namespace kernel_arithmetic
+
+/// How much of their bounds numbers use.
+struct Shares {
+  double worst = 0;        ///< of all
+  double worstOfPose = 0;  ///< of the pose that is added
+  double sum = 0;          ///< of the worst of each pose
+  std::size_t poses = 0, count = 0, unbounded = 0;
+
+  void add(double actual, double expected, double bound) {
+    if (!std::isfinite(bound)) {
+      ++unbounded;
+      return;
+    }
+    const double error = std::abs(actual - expected);
+    const double share = error == 0 ? 0 : error / bound;
+    worstOfPose = std::max(worstOfPose, share <= 1e9 ? share : 1e9);  // not a number, too
+    worst = std::max(worst, worstOfPose);
+    ++count;
+  }
+  void add(const DrivenPose& actual, const reference::EvaluatedRig& expected) {
+    ASSERT_EQ(actual.joints.size(), expected.joints.size());
+    ASSERT_EQ(actual.weights.size(), expected.weights.size());
+    for (std::size_t i = 0; i < actual.joints.size(); ++i) {
+      for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 4; ++column)
+          add(double{actual.joints[i].m[row][column]}, expected.joints[i][row][column],
+              expected.jointBounds[i][row][column]);
+      }
+    }
+    for (std::size_t i = 0; i < actual.weights.size(); ++i)
+      add(double{actual.weights[i]}, expected.weights[i], expected.weightBounds[i]);
+    sum += std::exchange(worstOfPose, 0);
+    ++poses;
+  }
+  double mean() const { return sum / static_cast<double>(poses); }
+  double shareUnbounded() const {
+    return static_cast<double>(unbounded) / static_cast<double>(count + unbounded);
+  }
+};
+
+constexpr RigKind kinds[] = {
+    {.name = "Plain"},
+    {.name = "Gentle", .angle = 0.7},
+    {.name = "Scaled", .isScaled = true},
+    {.name = "Mirrored", .isMirrored = true},
+    {.name = "Far", .distance = 1e4},
+    {.name = "Tiny", .unit = 1e-6, .isScaled = true},
+    {.name = "Huge", .unit = 1e6, .isScaled = true, .isMirrored = true},
+    {.name = "Flat", .flatness = 1e-4},
+};
+
+class RigBounds : public testing::TestWithParam<RigKind> {};
+INSTANTIATE_TEST_SUITE_P(All, RigBounds, testing::ValuesIn(kinds),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(RigBounds, HoldForEvaluateRigAndForInexactArithmetic) {
+  std::mt19937 random(7);
+  Shares exact, inexact;
+  for (int round = 0; round < 300; ++round) {
+    const MadeRig rig = randomRig(random, GetParam());
+    const PackedRig packed = rig.pack();
+    for (int i = 0; i < 4; ++i) {
+      const std::vector<JointMatrix> pose = randomRigPose(random, rig, GetParam());
+      std::vector<float> weights;
+      for (std::uint32_t weight = 0; weight < rig.givenWeights; ++weight)
+        weights.push_back(static_cast<float>(between(random, -1, 1)));
+      const auto expected = reference::evaluateRig(rig.view(), pose, weights);
+      ASSERT_TRUE(expected.ok()) << expected.error().message;
+      exact.add(evaluated(packed, pose, weights), *expected);
+      inexact.add(kernel_arithmetic::evaluate(packed, pose, weights), *expected);
+      ASSERT_LE(exact.worst, 1) << "round " << round;
+      ASSERT_LE(inexact.worst, 1) << "round " << round;
+    }
+  }
+  std::printf(
+      "%s: %zu numbers, error / bound: %.3f at most, of a pose %.3f in the mean; inexact "
+      "arithmetic: %.3f, %.3f; without a bound: %.2f %%\n",
+      GetParam().name, exact.count, exact.worst, exact.mean(), inexact.worst, inexact.mean(),
+      100 * exact.shareUnbounded());
+  EXPECT_GT(exact.mean(), 0.02);
+  EXPECT_LT(exact.shareUnbounded(), 0.3);  // drivers that read drivers that read drivers
+}
+
+}  // namespace
+}  // namespace dermis::test
