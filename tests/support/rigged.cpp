@@ -9,72 +9,77 @@
 
 namespace dermis::test {
 
-PackedRig riggedPose(std::uint32_t seed, std::uint32_t given, std::uint32_t weightsOf) {
+std::unique_ptr<const RigSource> riggedSource(std::uint32_t seed, std::uint32_t given,
+                                              std::uint32_t weightsOf) {
+  auto made = std::make_unique<RigSource>();
+  RigSource& rig = *made;
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> between(-1, 1);
   const auto quaternion = [&] {
     return std::array<float, 4>{between(random), between(random), between(random), 1.5f};
   };
   // Joints in a row, with driven ones between them.
-  std::vector<RigJoint> joints(riggedJoints + drivenJoints);
-  for (std::uint32_t joint = 0; joint < joints.size(); ++joint) {
-    RigJoint& made = joints[joint];
-    if (joint != 0) made.parent = joint < riggedJoints ? joint - 1 : joint - riggedJoints;
-    made.bind.m[0][3] = 0.3f * static_cast<float>(joint % riggedJoints);
-    made.bind.m[1][3] = 0.1f * between(random);
+  rig.joints.resize(riggedJoints + drivenJoints);
+  for (std::uint32_t joint = 0; joint < rig.joints.size(); ++joint) {
+    RigJoint& own = rig.joints[joint];
+    if (joint != 0) own.parent = joint < riggedJoints ? joint - 1 : joint - riggedJoints;
+    own.bind.m[0][3] = 0.3f * static_cast<float>(joint % riggedJoints);
+    own.bind.m[1][3] = 0.1f * between(random);
   }
   const std::uint32_t first = riggedJoints;
-  const std::array twists{
+  rig.twists = {
       TwistDriver{.joint = first, .source = 3, .axis = {1, 0.2f, 0}, .share = 0.5f},
       TwistDriver{.joint = first + 1, .source = first, .axis = {1, 0, 0}, .share = -0.75f}};
   // Two correctives: of two joints for a joint and two weights, and of one for three weights.
-  const std::array<std::uint32_t, 2> inputs{2, 5};
-  const std::array<std::uint32_t, 1> offsetJoints{first + 2};
-  std::vector<std::array<float, 4>> examples, others;
-  std::vector<float> weights, otherWeights;
-  std::vector<JointOffset> offsets;
+  rig.inputs = {2, 5};
+  rig.offsetJoints = {first + 2};
   for (int example = 0; example < 5; ++example) {
-    examples.insert(examples.end(), {quaternion(), quaternion()});
-    others.push_back(quaternion());
-    weights.insert(weights.end(), {between(random), between(random)});
-    otherWeights.insert(otherWeights.end(), {between(random), between(random), between(random)});
-    offsets.push_back({{between(random), between(random), 0.1f}, quaternion(), {1, 1.5f, 0.75f}});
+    rig.examples.insert(rig.examples.end(), {quaternion(), quaternion()});
+    rig.otherExamples.push_back(quaternion());
+    rig.weights.insert(rig.weights.end(), {between(random), between(random)});
+    rig.otherWeights.insert(rig.otherWeights.end(),
+                            {between(random), between(random), between(random)});
+    rig.offsets.push_back(
+        {{between(random), between(random), 0.1f}, quaternion(), {1, 1.5f, 0.75f}});
   }
-  const std::array correctives{CorrectiveDriver{.inputs = inputs,
-                                                .examples = examples,
-                                                .radius = 0.75f,
-                                                .firstWeight = given,
-                                                .weightCount = 2,
-                                                .weights = weights,
-                                                .joints = offsetJoints,
-                                                .offsets = offsets},
-                               CorrectiveDriver{.inputs = std::span(inputs).first(1),
-                                                .examples = others,
-                                                .radius = 0,
-                                                .firstWeight = given + 2,
-                                                .weightCount = 3,
-                                                .weights = otherWeights}};
-  const std::array<std::uint32_t, 3> chainJoints{0, 1, 2};
-  const std::array chains{
-      ChainDriver{.joints = chainJoints, .firstDriven = first + 3, .segments = 4}};
-  const std::array<std::uint32_t, 3> terms{0, 3, 1};
-  std::array<JointMatrix, 3> matrices{};
-  for (JointMatrix& matrix : matrices) {
+  rig.correctives = {CorrectiveDriver{.inputs = rig.inputs,
+                                      .examples = rig.examples,
+                                      .radius = 0.75f,
+                                      .firstWeight = given,
+                                      .weightCount = 2,
+                                      .weights = rig.weights,
+                                      .joints = rig.offsetJoints,
+                                      .offsets = rig.offsets},
+                     CorrectiveDriver{.inputs = std::span(rig.inputs).first(1),
+                                      .examples = rig.otherExamples,
+                                      .radius = 0,
+                                      .firstWeight = given + 2,
+                                      .weightCount = 3,
+                                      .weights = rig.otherWeights}};
+  rig.chainJoints = {0, 1, 2};
+  rig.chains = {ChainDriver{.joints = rig.chainJoints, .firstDriven = first + 3, .segments = 4}};
+  rig.terms = {0, 3, 1};
+  rig.matrices.resize(rig.terms.size());
+  for (JointMatrix& matrix : rig.matrices) {
     for (auto& row : matrix.m) {
       for (float& number : row) number = 0.2f * between(random);
     }
   }
-  const std::array linears{
-      LinearDriver{.joint = first + 6, .weights = terms, .matrices = matrices}};
-  return must(packRig({.joints = joints,
-                       .writtenJoints = riggedJoints,
-                       .givenWeights = given,
-                       .drivenWeights = drivenWeights,
-                       .weightsOf = weightsOf,
-                       .twists = twists,
-                       .correctives = correctives,
-                       .chains = chains,
-                       .linears = linears}));
+  rig.linears = {LinearDriver{.joint = first + 6, .weights = rig.terms, .matrices = rig.matrices}};
+  rig.view = {.joints = rig.joints,
+              .writtenJoints = riggedJoints,
+              .givenWeights = given,
+              .drivenWeights = drivenWeights,
+              .weightsOf = weightsOf,
+              .twists = rig.twists,
+              .correctives = rig.correctives,
+              .chains = rig.chains,
+              .linears = rig.linears};
+  return made;
+}
+
+PackedRig riggedPose(std::uint32_t seed, std::uint32_t given, std::uint32_t weightsOf) {
+  return must(packRig(riggedSource(seed, given, weightsOf)->view));
 }
 
 PackedRig smallRig() {

@@ -1,7 +1,9 @@
 // A rig with every kind of driver, for poses of eight joints.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -14,7 +16,29 @@ inline constexpr std::uint32_t drivenJoints = 7;  ///< two twists, an offset, a 
 inline constexpr std::uint32_t givenWeights = 2;
 inline constexpr std::uint32_t drivenWeights = 5;
 
+/// Owns what the view refers to.
+struct RigSource {
+  std::vector<RigJoint> joints;
+  std::vector<TwistDriver> twists;
+  std::vector<std::uint32_t> inputs, offsetJoints, chainJoints, terms;
+  std::vector<std::array<float, 4>> examples, otherExamples;
+  std::vector<float> weights, otherWeights;
+  std::vector<JointOffset> offsets;
+  std::vector<JointMatrix> matrices;
+  std::vector<CorrectiveDriver> correctives;
+  std::vector<ChainDriver> chains;
+  std::vector<LinearDriver> linears;
+  RigView view;
+
+  RigSource() = default;
+  RigSource(const RigSource&) = delete;
+  RigSource& operator=(const RigSource&) = delete;
+};
+
 /// `seed` changes what drivers have for numbers. `weightsOf`: the node of its given weights.
+std::unique_ptr<const RigSource> riggedSource(std::uint32_t seed = 1,
+                                              std::uint32_t given = givenWeights,
+                                              std::uint32_t weightsOf = 0xffffffffu);
 PackedRig riggedPose(std::uint32_t seed = 1, std::uint32_t given = givenWeights,
                      std::uint32_t weightsOf = 0xffffffffu);
 
