@@ -2,28 +2,28 @@
 # computes must include this check. Subprojects are tested by package.subproject.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
-set(flags -std=c++20 -fsyntax-only -I "${sourceFolder}/engine/include" -I "${sourceFolder}/engine/src" -I "${coreFolder}"
+set(flags -std=c++20 -I "${sourceFolder}/engine/include" -I "${sourceFolder}/engine/src" -I "${coreFolder}"
     -I "${sourceFolder}/shaders")
 foreach(flag IN ITEMS -ffast-math -Ofast -ffinite-math-only -D_M_FP_FAST)
-  say("Compile with ${flag}")
-  execute_process(COMMAND "${ownCompiler}" ${flags} ${flag} "${coreFolder}/validate.cpp" RESULT_VARIABLE status OUTPUT_QUIET
+  say("Preprocess with ${flag}")
+  execute_process(COMMAND "${ownCompiler}" ${flags} ${flag} -M "${coreFolder}/validate.cpp" RESULT_VARIABLE status OUTPUT_QUIET
                   ERROR_VARIABLE printed)
   if(status EQUAL 0 OR NOT printed MATCHES "Dermis: compile without -ffast-math")
-    wrong("validate.cpp compiled, or failed for another reason:\n${printed}")
+    wrong("validate.cpp was accepted, or failed for another reason:\n${printed}")
   endif()
 endforeach()
-say("Compile as for the x87 unit")
+say("Preprocess as for the x87 unit")
 set(x87 -U__FLT_EVAL_METHOD__ -D__FLT_EVAL_METHOD__=2)
-execute_process(COMMAND "${ownCompiler}" ${flags} ${x87} "${coreFolder}/validate.cpp" RESULT_VARIABLE status OUTPUT_QUIET
+execute_process(COMMAND "${ownCompiler}" ${flags} ${x87} -M "${coreFolder}/validate.cpp" RESULT_VARIABLE status OUTPUT_QUIET
                 ERROR_VARIABLE printed)
 if(status EQUAL 0 OR NOT printed MATCHES "Dermis: compile for SSE2")
-  wrong("validate.cpp compiled, or failed for another reason:\n${printed}")
+  wrong("validate.cpp was accepted, or failed for another reason:\n${printed}")
 endif()
-run(ignored "Compile a program of an engine for it" "${ownCompiler}" ${flags} ${x87} -include
+run(ignored "Compile a program of an engine for it" "${ownCompiler}" ${flags} -fsyntax-only ${x87} -include
     "${sourceFolder}/engine/include/dermis/scene.h" -x c++ /dev/null)
-run(ignored "Compile a program of an engine with -ffast-math" "${ownCompiler}" ${flags} -ffast-math -include
+run(ignored "Compile a program of an engine with -ffast-math" "${ownCompiler}" ${flags} -fsyntax-only -ffast-math -include
     "${sourceFolder}/engine/include/dermis/scene.h" -x c++ /dev/null)
-run(ignored "Compile without" "${ownCompiler}" ${flags} "${coreFolder}/validate.cpp")
+run(ignored "Preprocess without" "${ownCompiler}" ${flags} -M "${coreFolder}/validate.cpp")
 
 say("Look for sources that compute and do not refuse these flags")
 file(GLOB_RECURSE sources "${sourceFolder}/engine/src/core/*.cpp" "${sourceFolder}/engine/src/cpu/*.cpp" "${sourceFolder}/engine/src/cpu/kernels_inl.h"
