@@ -3,7 +3,7 @@
 #
 #   tests/run.sh                   what CI runs: `ci`, then `sanitized`. What both could run, `sanitized` runs
 #   tests/run.sh PRESET            ci, dev, release, asan or tsan: builds it, runs all tests of every change
-#   tests/run.sh sanitized         what needs no device, with address and undefined-behavior sanitizers
+#   tests/run.sh sanitized         what needs no device, with address and undefined-behavior sanitizers; fewer cases of what takes long
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, or else in ../shared, and are

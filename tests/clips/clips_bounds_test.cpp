@@ -22,10 +22,13 @@
 #include "dermis/mesh.h"
 #include "dermis/verify.h"
 #include "exhaustive.h"
+#include "few_cases.h"
 #include "random_number.h"
 
 namespace dermis::test {
 namespace {
+
+constexpr std::uint32_t posesPerClip = fewer(40u, 4u);
 
 /// Those for which `skinnedBounds` has a proof.
 constexpr Method provenMethods[] = {Method::linear, Method::dualQuaternion, Method::blended};
@@ -244,15 +247,16 @@ TEST(ClipsBounds, ContainModels) {
       if (few.mesh().influenceSets.empty() || !jointBounds(few.mesh(), maxPoseJoints)) continue;
       SCOPED_TRACE("skin " + std::to_string(skinned.skin));
       const Method method = provenMethods[(number + meshes) % 3];
-      checkClips(rig, few.mesh(), skinned.skin, method, 40, random, number < 3 ? samples : clips);
-      checkBlends(rig, few.mesh(), skinned.skin, method, 40, random, blends);
+      checkClips(rig, few.mesh(), skinned.skin, method, posesPerClip, random,
+                 number < 3 ? samples : clips);
+      checkBlends(rig, few.mesh(), skinned.skin, method, posesPerClip, random, blends);
       if (++meshes == 2 || ::testing::Test::HasFailure()) return;
     }
   });
   samples.print("clips of samples");
   clips.print("clips of other models");
   blends.print("blends");
-  EXPECT_LT(samples.worst, 1.3);
+  EXPECT_TRUE(samples.worst < 1.3 || hasFewCases);
 }
 
 /// Clips with jumps, splines, spins, scales that change their sign; meshes whose vertices have
@@ -269,13 +273,15 @@ TEST_P(ClipsBoundsVariants, AreContained) {
     const gltf::Primitive primitive = scatteredMesh(rig, 0, random);
     const gltf::PrimitiveView view(primitive);
     for (const Method method : provenMethods) {
-      checkClips(rig, view.mesh(), 0, method, 40, random, clips);
-      checkBlends(rig, view.mesh(), 0, method, 40, random, blends);
+      if (hasFewCases && method != provenMethods[static_cast<std::size_t>(GetParam()) % 3])
+        continue;
+      checkClips(rig, view.mesh(), 0, method, posesPerClip, random, clips);
+      checkBlends(rig, view.mesh(), 0, method, posesPerClip, random, blends);
     }
   };
   check(armRig(), 0);
   forEachAnimatedModel(2, [&](gltf::Model model, std::uint32_t number) {
-    if (number < (isExhaustive ? 3u : 1u)) check(std::move(model), number + 1);
+    if (number < (isExhaustive ? 3u : hasFewCases ? 0u : 1u)) check(std::move(model), number + 1);
   });
   clips.print("clips");
   blends.print("blends");

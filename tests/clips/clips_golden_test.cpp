@@ -18,6 +18,7 @@
 
 #include "clip_rig.h"
 #include "dermis/verify.h"
+#include "few_cases.h"
 #include "gltf_builder.h"
 #include "golden_file.h"
 #include "matrix_of.h"
@@ -87,8 +88,9 @@ TEST(ClipsGolden, EveryPoseAgrees) {
   if (!data) GTEST_SKIP() << noTestData;
   std::unique_ptr<PackedRig> rig;
   std::string loadedFile;
-  std::size_t poses = 0;
+  std::size_t poses = 0, number = 0;
   for (const nlohmann::json& entry : goldenManifest(*data)) {
+    if (number++ % (hasFewCases ? 4 : 1) != 0) continue;
     const std::string file = entry["file"].get<std::string>();
     SCOPED_TRACE(entry["golden"].get<std::string>());
     if (file != loadedFile) {
@@ -118,7 +120,7 @@ TEST(ClipsGolden, EveryPoseAgrees) {
     }
     ++poses;
   }
-  EXPECT_GE(poses, 76u);
+  EXPECT_GE(poses, fewer(76u, 4u));
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "cpu/clip_plan.h"
 #include "dermis/cpu.h"
 #include "exhaustive.h"
+#include "few_cases.h"
 #include "random_number.h"
 #include "scene_meshes.h"
 #include "test_data.h"
@@ -27,9 +28,9 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t maxClipsOfModel = isExhaustive ? 1000 : 3;
-constexpr std::uint32_t timesPerClip = isExhaustive ? 400 : 12;
-constexpr std::uint32_t layersPerModel = isExhaustive ? 400 : 12;
+constexpr std::uint32_t maxClipsOfModel = isExhaustive ? 1000 : fewer(3u, 2u);
+constexpr std::uint32_t timesPerClip = isExhaustive ? 400 : fewer(12u, 3u);
+constexpr std::uint32_t layersPerModel = isExhaustive ? 400 : fewer(12u, 3u);
 
 /// Calls with each model, and its number. At most `maxClipsOfModel` of its clips are kept.
 void forEachModel(const std::function<void(gltf::Model, std::uint32_t)>& call) {
@@ -117,11 +118,11 @@ TEST(CpuPoses, RotationsAreInTheHemisphereOfTheFirstLayerWithWeight) {
   CpuPoses(bank).check(layers);
 }
 
-/// Each clip alone. Returns the largest error divided by its bound.
+/// Each of the model's clips alone. Returns the largest error divided by its bound.
 double checkEachClip(const PackedRig& rig, std::mt19937& random) {
   double worst = 0;
   CpuPoses cpu(*rig.bank);
-  for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
+  for (std::uint32_t clip = 0; clip < rig.model.clips.size(); ++clip) {
     SCOPED_TRACE("clip " + std::to_string(clip));
     for (const double time : timesOf(rig.clips[clip], random)) {
       SCOPED_TRACE("at " + std::to_string(time));
@@ -139,8 +140,8 @@ double checkEachClip(const PackedRig& rig, std::mt19937& random) {
 }
 
 /// Adds clips that do not wrap, and differences from the rest pose and from the first clip's start.
-/// Then packs with masks, and checks random layers of all of these.
-void checkLayers(PackedRig& rig, std::mt19937& random) {
+/// Packs them with masks.
+bool packWithLayers(PackedRig& rig, std::mt19937& random) {
   ClipView once = rig.clips[0], fromRest = rig.clips.back(), fromFirst = rig.clips.back();
   once.wraps = false;
   fromRest.additive = fromFirst.additive = true;
@@ -153,7 +154,11 @@ void checkLayers(PackedRig& rig, std::mt19937& random) {
                                   : chance(random, 30) ? 1
                                                        : between(random, 0, 1));
   }
-  if (!rig.pack()) return;
+  return rig.pack();
+}
+
+/// Random layers of all of these.
+void checkLayers(const PackedRig& rig, std::mt19937& random) {
   CpuPoses cpu(*rig.bank);
   for (std::uint32_t i = 0; i < layersPerModel; ++i) {
     const std::vector<ClipLayer> layers = randomLayers(rig, random);
@@ -220,16 +225,16 @@ TEST(ClipsModels, JointsOfSkinsThatAreCalledRigidNeverScale) {
     }
   });
   std::printf("%u of %u skins are called rigid, and %u might be\n", rigid, skins, missed);
-  EXPECT_LE(missed, skins / 20);
+  EXPECT_TRUE(missed <= skins / 20 || hasFewCases);
   EXPECT_GT(rigid, 0u);
-  EXPECT_TRUE(rigid < skins || !testDataFolder());
+  EXPECT_TRUE(rigid < skins || !testDataFolder() || hasFewCases);
 }
 
 TEST(ClipsModels, LayersAreWithinTheirBounds) {
   forEachModel([](gltf::Model model, std::uint32_t) {
     std::mt19937 random(2);
     PackedRig rig(std::move(model));
-    checkLayers(rig, random);
+    if (packWithLayers(rig, random)) checkLayers(rig, random);
   });
 }
 
@@ -238,7 +243,7 @@ class ClipsVariants : public ::testing::TestWithParam<ClipVariant> {
  protected:
   static bool isChosen(std::uint32_t number) {
     const auto variant = static_cast<std::uint32_t>(GetParam());
-    return isExhaustive || number % 12 == variant;
+    return isExhaustive || (hasFewCases ? number == variant % 3 : number % 12 == variant);
   }
 };
 
@@ -247,7 +252,7 @@ TEST_P(ClipsVariants, AreWithinTheirBounds) {
     if (!isChosen(number)) return;
     std::mt19937 random(number);
     PackedRig rig(withVariant(std::move(model), GetParam(), number));
-    if (!rig.pack()) return;
+    if (!packWithLayers(rig, random)) return;
     checkEachClip(rig, random);
     checkLayers(rig, random);
   });

@@ -22,6 +22,7 @@
 
 #include "clip_rig.h"
 #include "dermis/verify.h"
+#include "few_cases.h"
 #include "matrix_of.h"
 #include "random_number.h"
 #include "scene_meshes.h"
@@ -100,7 +101,7 @@ void checkMotion(const PackedRig& rig, const ClipLayer& layer) {
   }
 }
 
-void checkClips(const PackedRig& rig, std::mt19937& random, int times = 40) {
+void checkClips(const PackedRig& rig, std::mt19937& random, int times = fewer(40, 4)) {
   for (std::uint32_t clip = 0; clip < rig.clips.size(); ++clip) {
     SCOPED_TRACE("clip " + std::to_string(clip));
     for (int i = 0; i < times; ++i) {
@@ -181,7 +182,7 @@ TEST(ClipsRootMotion, MotionAndPoseAreTheClip) {
     ASSERT_TRUE(rig.pack());
     EXPECT_TRUE(rig.bank->hasRootMotion());
     EXPECT_GT(rig.bank->rootMotionError().translation, 0);
-    checkClips(rig, random, 200);
+    checkClips(rig, random, fewer(200, 4));
   }
 }
 
@@ -312,7 +313,7 @@ TEST(ClipsRootMotion, OfModelsIsWhatTheReferenceSays) {
     if (!rig.tryToPack().ok()) return;
     ASSERT_TRUE(rig.pack());
     ++packed;
-    checkClips(rig, random, 12);
+    checkClips(rig, random, fewer(12, 2));
   });
   EXPECT_GE(packed, 3u);
 }

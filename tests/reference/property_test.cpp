@@ -5,12 +5,13 @@
 #include <string>
 
 #include "exact_joints.h"
+#include "few_cases.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
 namespace {
 
-constexpr int caseCount = 100000;
+constexpr int caseCount = fewer(100000);
 
 /// What is special about the joints of a case.
 enum class Kind {
@@ -213,7 +214,7 @@ TEST(Property, IterativeBlendingOfTwoJointsTakesTheShortestWayAtConstantSpeed) {
 TEST(Property, LogarithmsMayLeaveTheShortestWay) {
   RigRandom random(5);
   int longer = 0, cases = 0;
-  for (int number = 0; number < 10000; ++number) {
+  for (int number = 0; number < fewer(10000); ++number) {
     const Case sample = randomCase(random, kindCount * number);  // uniform
     const std::span<const DualQuatd> pair = std::span(sample.joints).first(2);
     const glm::dmat3 a = glm::mat3_cast(pair[0].real), b = glm::mat3_cast(pair[1].real);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "exact_joints.h"
+#include "few_cases.h"
 #include "reference_rig.h"
 
 namespace dermis::test {
@@ -285,7 +286,7 @@ TEST(ReferenceTruths, Truth06_NegatingAJointMovesNoPointInAnyBitWhateverTheMetho
 TEST(ReferenceTruths, Truth07_IterativeBlendingOfTwoJointsIsTheScrew) {
   RigRandom random(8);
   double worst = 0;
-  for (int trial = 0; trial < 5000; ++trial) {
+  for (int trial = 0; trial < fewer(5000); ++trial) {
     const DualQuatd a = randomRigid(random), b = randomRigid(random);
     if (std::abs(glm::dot(a.real, b.real)) < 0.01) continue;  // either way round is as short
     const double t = random.between(0, 1);
@@ -347,7 +348,7 @@ double residualOf(const ExactRig& rig, const DualQuatd& b) {
 TEST(ReferenceTruths, Truth07_FourJointsWithin15RadiansEndWithin20Steps) {
   RigRandom random(9);
   double worst = 0;
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (int trial = 0; trial < fewer(20000); ++trial) {
     const ExactRig rig = FourJoints(random).rig(randomRigid(random));
     const reference::VertexToSkin vertex{rig.joints(), rig.influences(), {}, {}};
     reference::Conditioning conditioning;

@@ -20,6 +20,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "dermis/verify.h"
+#include "few_cases.h"
 #include "joint_of.h"
 #include "random_rig.h"
 
@@ -123,7 +124,7 @@ TEST(Bounds, HoldRandomMeshesInRandomPoses) {
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u, 5u, 8u, 9u, 16u, 64u}) {
     for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                     Rigidity::mirrored, Rigidity::mirroredAlongOneAxis}) {
-      const std::uint32_t repeats = influences > 8 ? 4 : 40;
+      const std::uint32_t repeats = test::fewer(influences > 8 ? 4u : 40u);
       for (std::uint32_t i = 0; i < repeats; ++i, ++seed) {
         const std::uint32_t joints = influences + seed % 5;
         OwnedMesh mesh = test::randomMesh(seed, 12, joints, influences, false);
@@ -188,7 +189,7 @@ JointMatrix awkwardJoint(Random& random) {
 }
 
 TEST(Bounds, HoldMeshesOfAwkwardJoints) {
-  for (std::uint32_t seed = 1; seed <= 1500; ++seed) {
+  for (std::uint32_t seed = 1; seed <= test::fewer(1500u); ++seed) {
     Random random(seed);
     const std::uint32_t joints = 2 + random.below(6);
     const std::uint32_t influences = std::min(joints, 2 + random.below(4));
@@ -243,7 +244,7 @@ struct Climber {
 };
 
 TEST(Bounds, CannotBeEscapedByClimbing) {
-  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint32_t seed = 1; seed <= test::fewer(60u); ++seed) {
     for (const std::uint32_t influences : {2u, 3u, 4u, 6u, 10u}) {
       Random random(1000 * influences + seed);
       const bool scaled = seed % 3 == 0;
@@ -308,7 +309,7 @@ void expectInsideWithoutScale(OwnedMesh& mesh, std::span<const JointMatrix> scal
 }
 
 TEST(Bounds, HoldMeshesWhoseScaleIsIgnored) {
-  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint32_t seed = 1; seed <= test::fewer(60u); ++seed) {
     Random random(seed);
     OwnedMesh mesh = test::randomMesh(seed, 200, 6, 1 + seed % 5);
     std::vector<JointMatrix> scaled, rotated;
@@ -476,6 +477,8 @@ struct Creature {
   }
 };
 
+constexpr int creaturePoses = test::fewer(40);
+
 TEST(Bounds, AreTightForACreature) {
   Creature creature;
   Random random(11);
@@ -484,14 +487,14 @@ TEST(Bounds, AreTightForACreature) {
          {std::array{30.0, 0.02, 0.06}, std::array{60.0, 0.04, 0.12},
           std::array{90.0, 0.1, 0.25}}) {
       double sum = 0, worst = 0;
-      for (int i = 0; i < 40; ++i) {
+      for (int i = 0; i < creaturePoses; ++i) {
         const std::vector<JointMatrix> pose = creature.pose(random, angle * pi / 180);
         expectInside(creature.mesh, pose, "a creature");
         const double added = excess(creature.mesh, pose, method);
         sum += added;
         worst = std::max(worst, added);
       }
-      EXPECT_LE(sum / 40, mean) << methodName(method) << " at " << angle << " degrees";
+      EXPECT_LE(sum / creaturePoses, mean) << methodName(method) << " at " << angle << " degrees";
       EXPECT_LE(worst, most) << methodName(method) << " at " << angle << " degrees";
     }
   }
@@ -503,7 +506,7 @@ TEST(Bounds, StayTightWhereAJointScales) {
   Creature creature;
   Random random(12);
   double sum = 0;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < creaturePoses; ++i) {
     std::vector<JointMatrix> pose = creature.pose(random, 30 * pi / 180);
     const std::size_t joint = 3 * (1 + random.below(6));
     const glm::dvec3 origin = creature.origins[joint];
@@ -515,7 +518,7 @@ TEST(Bounds, StayTightWhereAJointScales) {
     expectInside(creature.mesh, pose, "a creature with a large hand");
     sum += excess(creature.mesh, pose, Method::dualQuaternion);
   }
-  EXPECT_LE(sum / 40, 0.03);
+  EXPECT_LE(sum / creaturePoses, 0.03);
 }
 
 TEST(Bounds, KeepVerticesWithoutWeightInBindPose) {

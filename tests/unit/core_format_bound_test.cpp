@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "dermis/verify.h"
+#include "few_cases.h"
 #include "verify/conditioning.h"
 #include "vertex_encoder.h"
 
@@ -96,11 +97,11 @@ TEST(FormatBounds, FollowFromTheFormats) {
 struct RoundedNormal : public ::testing::TestWithParam<VertexFormat> {};
 struct RoundedTangent : public ::testing::TestWithParam<VertexFormat> {};
 
-TEST_P(RoundedNormal, AMillionAreInsideTheBoundAndSomeAreNearIt) {
+TEST_P(RoundedNormal, AreInsideTheBoundAndSomeAreNearIt) {
   const VertexFormat format = GetParam();
   Directions directions;
   double worst = 0;
-  for (int trial = 0; trial < 1000000; ++trial) {
+  for (int trial = 0; trial < test::fewer(1000000); ++trial) {
     const Double3 normal = directions.next();
     const EncodedVertex encoded = encodeNormal(format, normal);
     worst = std::max(worst, distance(decodeNormal(format, encoded.data()), normal));
@@ -111,11 +112,11 @@ TEST_P(RoundedNormal, AMillionAreInsideTheBoundAndSomeAreNearIt) {
   EXPECT_GT(share, 0.8);
 }
 
-TEST_P(RoundedTangent, AMillionAreInsideTheBoundAndSomeAreNearIt) {
+TEST_P(RoundedTangent, AreInsideTheBoundAndSomeAreNearIt) {
   const VertexFormat format = GetParam();
   Directions directions;
   double worst = 0;
-  for (int trial = 0; trial < 1000000; ++trial) {
+  for (int trial = 0; trial < test::fewer(1000000); ++trial) {
     const Double3 t = directions.next();
     const double handedness = trial % 2 == 0 ? 1 : -1;
     const EncodedVertex encoded = encodeTangent(format, {t[0], t[1], t[2], handedness});
@@ -142,7 +143,7 @@ INSTANTIATE_TEST_SUITE_P(All, RoundedTangent, ::testing::ValuesIn(formatsThat(is
 TEST(FormatBounds, HoldForAnEncoderInFloat) {
   Directions directions;
   double worst = 0;
-  for (int trial = 0; trial < 1000000; ++trial) {
+  for (int trial = 0; trial < test::fewer(1000000); ++trial) {
     const Double3 normal = directions.next();
     float v[3];
     for (std::size_t i = 0; i < 3; ++i) v[i] = static_cast<float>(normal[i]);
@@ -169,7 +170,7 @@ TEST(FormatBounds, HalvesOfPositionsOfAnySizeAreInsideAndSomeAreNear) {
   std::normal_distribution<double> normal;
   for (const double size : {1e-7, 1e-4, 1.0, 1000.0}) {
     double worst = 0;
-    for (int trial = 0; trial < 200000; ++trial) {
+    for (int trial = 0; trial < test::fewer(200000); ++trial) {
       const Double3 position{size * normal(random), size * normal(random), size * normal(random)};
       const EncodedVertex encoded = encodePosition(VertexFormat::float16x3, position);
       worst = std::max(
@@ -201,7 +202,7 @@ TEST(FormatBounds, PositionsInABoxAreInsideAndSomeAreNear) {
                {{{10000.001f, -1, 5}, {10000.9f, 1, 5}}, 0.2}};
   for (const auto& [box, least] : cases) {
     double worst = 0;
-    for (int trial = 0; trial < 200000; ++trial) {
+    for (int trial = 0; trial < test::fewer(200000); ++trial) {
       Double3 expected;
       EncodedVertex encoded;
       for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -530,6 +530,9 @@ int forEachPose(const std::filesystem::path& data, const Choice& choice,
 #ifdef DERMIS_EXHAUSTIVE
 const Choice soundChoice{.times = {0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1}};
 const Choice wrongChoice{.maxParts = 4, .times = {0.3, 0.7}};
+#elif defined(DERMIS_FEW_CASES)  // few_cases.h
+const Choice soundChoice{.maxParts = 4, .times = {0, 0.45}};
+const Choice wrongChoice{.everyModel = 6, .maxParts = 1, .times = {0.3}};
 #else
 const Choice soundChoice{.maxParts = 20, .times = {0, 0.2, 0.45, 0.7, 1}};
 const Choice wrongChoice{.everyModel = 3, .maxParts = 1, .times = {0.3}};
