@@ -119,9 +119,10 @@ std::vector<std::string> devicesToTry() {
 
 /// Every method on every device that has it, with what `check` expects of the file that is written.
 void skinEverywhere(const FileBuilder& file, const std::string& ending,
-                    const std::function<void(const std::string& out)>& check) {
+                    const std::function<void(const std::string& out)>& check,
+                    const std::vector<std::string>& devices = devicesToTry()) {
   const std::string model = writeModel("model.gltf", file), out = outFile("pose" + ending);
-  for (const std::string& device : devicesToTry()) {
+  for (const std::string& device : devices) {
     for (const Method method : allMethods) {
       if (device == "cpu" && isForComparison(method)) continue;
       const std::string name(methodName(method));
@@ -421,13 +422,15 @@ TEST_F(BadInput, AVertexWithNoWeightLeftStaysInBindPoseAndIsCounted) {
 
 // ---- a singular joint matrix (scale 0)
 
+// On devices one of them: BatchTest.SingularJointsGiveFiniteVertices skins with all of them.
 TEST_F(BadInput, ASingularJointMatrixGivesFiniteVertices) {
+  std::vector<std::string> devices = devicesToTry();
   for (const Json& scale : {Json{0, 0, 0}, Json{0, 1, 1}, Json{0, 0, 1}, Json{1e-30, 1, 1e-30}}) {
     FileBuilder file = fox();
     file.attributes()["NORMAL"] = file.addFloats({1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3");
     file.json["nodes"][2]["scale"] = scale;
     SCOPED_TRACE(scale.dump());
-    skinEverywhere(file, ".ply", [](const std::string& out) {
+    const auto isFinite = [](const std::string& out) {
       const std::optional<Ply> ply = readPly(out);
       ASSERT_TRUE(ply.has_value());
       ASSERT_EQ(ply->positions.size(), 3u);
@@ -435,7 +438,9 @@ TEST_F(BadInput, ASingularJointMatrixGivesFiniteVertices) {
         EXPECT_TRUE(std::isfinite(ply->positions[i / 3][i % 3])) << i;
         EXPECT_TRUE(std::isfinite(ply->normals[i / 3][i % 3])) << i;
       }
-    });
+    };
+    skinEverywhere(file, ".ply", isFinite, devices);
+    devices = {"cpu"};
   }
 }
 

@@ -204,9 +204,13 @@ std::map<std::string, std::size_t> casesByMethod(const std::string& json) {
   return count;
 }
 
-TEST(VerificationTest, QuickSkinsWithEveryMethodOfTheDeviceInAnyNumberOfThreads) {
+// Each of the threads opens the device. That the report is the same for any number of them is
+// tested on the CPU below.
+TEST(VerificationTest, QuickSkinsWithEveryMethodOfTheDeviceInThreads) {
   REQUIRE_DEVICE();
-  const std::string json = expectTheSameInThreads({"verify", "--quick"});
+  const std::string json = outFile("quick.json");
+  const CommandResult result = dermis({"verify", "--quick", "--json", json, "--threads", "3"});
+  EXPECT_EQ(result.status, 0) << result.output << result.errors;
   const std::map<std::string, std::size_t> count = casesByMethod(json);
   for (const Method method : allMethods)
     EXPECT_TRUE(count.contains(std::string(methodName(method)))) << methodName(method);

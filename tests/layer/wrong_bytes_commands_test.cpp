@@ -39,71 +39,58 @@ std::size_t countOf(const std::string& text, const std::string& part) {
   return count;
 }
 
-// Of the first pose, the second way to cut up the work: the sign and exponent of vertex 0's x. This
-// is the only whole `verify` on a device that every change runs, so all other cases are held to
-// pass.
-TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexIsWrong) {
+// Of the first pose, the second way to cut up the work: the sign and exponent of vertex 0's x. And
+// a bit of an exponent of the first pose of clips that is read back, the rest pose. This is the
+// only whole `verify` on a device that every change runs, so all other cases are held to pass.
+TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexAndWhichPoseOfAClipAreWrong) {
   REQUIRE_DEVICE();
   const std::string bar = std::string(sampleModels) + "/bar.glb";
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
   const CommandResult result = runWithWrongBytes(
       {dermisProgram, "verify", bar, "--threads", "1", "--json", json, "--junit", junit},
-      "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192");
+      "2 2 " + std::to_string(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) + " 3 192 1 1000000 " +
+          std::to_string(VK_BUFFER_USAGE_TRANSFER_DST_BIT) + " 3 1");
   EXPECT_EQ(result.status, 1) << result.errors;
   const std::string what = "1 vertices are outside their bound; the first is 0.";
+  const std::string whatOfClip = "1 points are outside their bound; the first is of joint 0.";
   const std::string bits =
       "the result does not have the same bits as that of 64 invocations, 4 instances each";
 
-  EXPECT_EQ(countOf(result.output, "FAILED  "), 1u) << result.output;
-  EXPECT_EQ(countOf(result.output, "FAILED  " + bar + "  linear: "), 1u) << result.output;
-  EXPECT_EQ(countOf(result.output, "linear, rest pose, 8 invocations, 1 instances each: " + what),
-            1u)
-      << result.output;
-  EXPECT_EQ(countOf(result.output, bits), 1u) << result.output;
+  for (const std::string& line : {"FAILED  " + bar + "  linear: ", "FAILED  " + bar + "  clips: ",
+                                  "linear, rest pose, 8 invocations, 1 instances each: " + what,
+                                  bits, ", clips, rest pose, joint matrices: " + whatOfClip})
+    EXPECT_EQ(countOf(result.output, line), 1u) << line << " in\n" << result.output;
+  EXPECT_EQ(countOf(result.output, "FAILED  "), 2u) << result.output;
 
   const nlohmann::json report = nlohmann::json::parse(readText(json));
   EXPECT_FALSE(report.at("passed").get<bool>());
-  EXPECT_EQ(report.at("models")[0].at("failures"), 1);
-  std::size_t failed = 0;
-  std::map<std::string, std::size_t> cases;
+  EXPECT_EQ(report.at("models")[0].at("failures"), 2);
+  std::map<std::string, std::size_t> cases, failed;
   for (const nlohmann::json& verified : report.at("models")[0].at("cases")) {
     EXPECT_EQ(verified.at("passed"), !verified.contains("failure"));
     EXPECT_GT(verified.value("vertices", verified.value("points", 0)), 0) << verified;
-    ++cases[verified.at("method")];
+    const std::string method = verified.at("method");
+    ++cases[method];
     if (verified.at("passed").get<bool>()) continue;
-    ++failed;
-    EXPECT_EQ(verified.at("method"), "linear");
+    ++failed[method];
+    const bool isOfClip = method == "clips";
     EXPECT_EQ(verified.at("pose"), "rest pose");
-    EXPECT_EQ(verified.at("variant"), "8 invocations, 1 instances each");
+    EXPECT_EQ(verified.at("variant"),
+              isOfClip ? "joint matrices" : "8 invocations, 1 instances each");
     EXPECT_EQ(verified.at("failures"), 1);
     EXPECT_GT(verified.at("worstPositionOfBound").get<double>(), 1);
-    EXPECT_TRUE(verified.at("failure").get<std::string>().starts_with(what)) << verified;
+    EXPECT_TRUE(verified.at("failure").get<std::string>().starts_with(isOfClip ? whatOfClip : what))
+        << verified;
   }
-  EXPECT_EQ(failed, 1u);
+  EXPECT_EQ(failed, (std::map<std::string, std::size_t>{{"clips", 1}, {"linear", 1}}));
   for (const Method method : allMethods)
     EXPECT_GE(cases[std::string(methodName(method))], 30u) << methodName(method);
 
   const std::string xml = readText(junit);
-  EXPECT_EQ(countOf(xml, "failures=\"1\" errors=\"0\""), 2u) << "of the model, and of all";
+  EXPECT_EQ(countOf(xml, "failures=\"2\" errors=\"0\""), 2u) << "of the model, and of all";
   EXPECT_EQ(countOf(xml, "<failure message=\"" + what), 1u);
-  EXPECT_EQ(countOf(xml, "<failure"), 1u);
-}
-
-// A bit of an exponent of the first pose that is read back, the rest pose.
-TEST(WrongBytesCommandsTest, VerifyTellsWhichPoseOfAClipIsWrong) {
-  REQUIRE_DEVICE();
-  const std::string bar = std::string(sampleModels) + "/bar.glb";
-  const CommandResult result =
-      runWithWrongBytes({dermisProgram, "verify", bar, "--quick", "--threads", "1"},
-                        "1 1000000 " + std::to_string(VK_BUFFER_USAGE_TRANSFER_DST_BIT) + " 3 1");
-  EXPECT_EQ(result.status, 1) << result.errors;
-  EXPECT_EQ(countOf(result.output, "FAILED  "), 1u) << result.output;
-  EXPECT_EQ(countOf(result.output, "FAILED  " + bar + "  clips: "), 1u) << result.output;
-  EXPECT_EQ(countOf(result.output,
-                    ", clips, rest pose, joint matrices: 1 points are outside their "
-                    "bound; the first is of joint 0."),
-            1u)
-      << result.output;
+  EXPECT_EQ(countOf(xml, "<failure message=\"" + whatOfClip), 1u);
+  EXPECT_EQ(countOf(xml, "<failure"), 2u);
 }
 
 // All bits of a few words of the output, in every frame that is read back.
