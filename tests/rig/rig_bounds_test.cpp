@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +11,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <glm/gtc/matrix_transform.hpp>
 
 #include "dermis/verify.h"
 #include "made_rig.h"
@@ -185,6 +188,66 @@ TEST_P(RigBounds, HoldForEvaluateRigAndForInexactArithmetic) {
       100 * exact.shareUnbounded());
   EXPECT_GT(exact.mean(), 0.02);
   EXPECT_LT(exact.shareUnbounded(), 0.3);  // drivers that read drivers that read drivers
+}
+
+/// The largest bound of a joint that takes half of the twist about x of joint 1, which is below 0.
+double boundOfTwist(const glm::dmat4& turn, const glm::dmat4& above = glm::dmat4(1)) {
+  MadeRig rig;
+  rig.addJoint(noRigJoint, glm::dmat4(1));
+  rig.addJoint(0, glm::dmat4(1));
+  rig.addJoint(0, glm::dmat4(1));
+  rig.writtenJoints = 2;
+  TwistDriver twist;
+  twist.joint = 2;
+  twist.source = 1;
+  rig.twists.push_back(twist);
+  const std::vector<JointMatrix> pose{jointMatrixOf(above), jointMatrixOf(above * turn)};
+  const auto expected = reference::evaluateRig(rig.view(), pose);
+  double most = 0;
+  for (const auto& row : expected->jointBounds[0])
+    for (const double bound : row) most = std::max(most, bound);
+  return most;
+}
+
+TEST(RigBoundsAreInfinite, WhereRoundingDecidesAndNowhereElse) {
+  EXPECT_LT(boundOfTwist(glm::dmat4(1)), 3e-6);
+  const double pi = 3.14159265358979;
+  const glm::dvec3 x(1, 0, 0), y(0, 1, 0);
+  EXPECT_LT(boundOfTwist(rotationAbout(x, pi - 2e-5)), 1e-5);
+  EXPECT_TRUE(std::isinf(boundOfTwist(rotationAbout(x, pi))));
+  EXPECT_LT(boundOfTwist(rotationAbout(y, pi - 1e-2)), 1e-2);  // the error / w
+  EXPECT_TRUE(std::isinf(boundOfTwist(rotationAbout(y, pi))));
+  EXPECT_LT(boundOfTwist(glm::dmat4(1), glm::dmat4(glm::dmat3(1e-6))), 1e-5);
+  for (const double size : {1e-20, 1e15}) {
+    EXPECT_TRUE(std::isinf(boundOfTwist(glm::dmat4(1), glm::dmat4(glm::dmat3(size))))) << size;
+  }
+  glm::dmat4 flat(1);
+  flat[1][1] = 0;
+  EXPECT_TRUE(std::isinf(boundOfTwist(glm::dmat4(1), flat)));
+
+  // Two joints of a chain that are turned against each other, and a linear driver too far away.
+  MadeRig rig;
+  for (int joint = 0; joint < 2; ++joint)
+    rig.addJoint(noRigJoint, glm::translate(glm::dmat4(1), glm::dvec3(joint, 0, 0)));
+  for (int joint = 0; joint < 3; ++joint) rig.addJoint(joint == 2 ? 0 : noRigJoint, glm::dmat4(1));
+  rig.writtenJoints = 2;
+  ChainDriver chain;
+  chain.joints = rig.keep(std::vector<std::uint32_t>{0, 1});
+  chain.firstDriven = 2;
+  chain.segments = 3;
+  rig.chains.push_back(chain);
+  rig.linears.push_back({.joint = 4});
+  const auto boundsOf = [&](const glm::dmat4& first, const glm::dmat4& second) {
+    const std::vector<JointMatrix> pose{jointMatrixOf(first), jointMatrixOf(second)};
+    const auto expected = reference::evaluateRig(rig.view(), pose);
+    return std::array{expected->jointBounds[0][1][1], expected->jointBounds[2][0][0]};
+  };
+  EXPECT_LT(boundsOf(glm::dmat4(1), rotationAbout(x, 3.14))[0], 1e-2);
+  EXPECT_TRUE(std::isinf(boundsOf(glm::dmat4(1), rotationAbout(x, pi))[0]));
+  const glm::dmat4 reversed = glm::translate(glm::dmat4(1), glm::dvec3(-4, 0, 0));
+  EXPECT_TRUE(std::isinf(boundsOf(glm::dmat4(1), reversed)[0]));
+  EXPECT_LT(boundsOf(glm::dmat4(1), reversed)[1], 1e-6);
+  EXPECT_TRUE(std::isinf(boundsOf(glm::scale(glm::dmat4(1), glm::dvec3(2e38)), reversed)[1]));
 }
 
 }  // namespace

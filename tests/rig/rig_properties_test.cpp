@@ -17,7 +17,6 @@ namespace dermis::test {
 namespace {
 
 constexpr double rightAngle = std::numbers::pi / 2;
-const std::vector<glm::dvec3> unitAxes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 /// Compares the numbers of the first three rows.
 double differenceOf(const glm::dmat4& a, const glm::dmat4& b) {

@@ -37,7 +37,7 @@ constexpr std::uint32_t noParent = 0xffffffffu;
 /// A rounding, with room for those of double precision and for products of roundings.
 constexpr double rounded = 1.001 * floatRounding;
 constexpr double leastNormal = 0x1p-126;  ///< a GPU may flush smaller numbers to 0
-constexpr double greatest = 0x1p126;      ///< larger numbers may overflow
+constexpr double overflowing = 0x1p126;   ///< larger numbers may overflow
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 /// Of a computation in double precision that packing does, too, relative to its largest number.
 constexpr double doubleRounding = 0x1p-49;
@@ -66,7 +66,7 @@ Number sumOf(std::span<const std::pair<Number, Number>> products) {
     size += a.size() * b.size();
   }
   sum.error += static_cast<double>(products.size()) * rounded * size;
-  if (!(size <= greatest)) sum.error = unbounded;
+  if (!(size <= overflowing)) sum.error = unbounded;
   return sum;
 }
 Number sumOf(std::initializer_list<std::pair<Number, Number>> products) {
@@ -155,7 +155,7 @@ double conditionOf(const dmat3& m) {
 /// the square root and the quotient round. Below 1e-37 a kernel takes the square for 0.
 double unitError(double length, double error) {
   const double square = length * length, least = (length - error) * (length - error);
-  if (!(error < length / 2) || !(least > 2e-37) || !(square < greatest / 4)) return unbounded;
+  if (!(error < length / 2) || !(least > 2e-37) || !(square < overflowing / 4)) return unbounded;
   return error / (length - error) + 6 * rounded + 4 * leastNormal / least;
 }
 
@@ -344,7 +344,7 @@ class RigReference {
     isKnown_[joint] = true;
     for (auto& row : joints_[joint])
       for (Number& number : row)
-        if (!(number.size() <= greatest)) number.error = unbounded;
+        if (!(number.size() <= overflowing)) number.error = unbounded;
   }
   void setRelative(std::uint32_t joint, const Numbers3x4& matrix) {
     const std::uint32_t parent = rig_.joints[joint].parent;
