@@ -70,7 +70,7 @@ Result<RestCurve> RestCurve::create(std::span<const RigJoint> joints, const Chai
 }
 
 CurvePlace RestCurve::at(double parameter) const {
-  const auto end = std::ranges::find_if(ends_, [&](double value) { return parameter < value; });
+  const auto end = std::ranges::upper_bound(ends_, parameter);
   const auto piece = static_cast<std::size_t>(end - ends_.begin());
   if (piece == ends_.size()) return {piece - 1, 1};
   return {piece, std::clamp((parameter - beginOf(piece)) / lengthOf(piece), 0.0, 1.0)};
