@@ -14,12 +14,14 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "dermis/clips.h"
 #include "dermis/cpu.h"
 #include "dermis/gltf.h"
 #include "dermis/mesh.h"
+#include "dermis/rig.h"
 #include "dermis/scene.h"
 #include "dermis/verify.h"
 #include "dermis/vulkan/drawing.h"
@@ -144,6 +146,44 @@ Result<void> animate(const PackedClips& bank, double seconds, float speed,
   return samplePose(bank, layers, skin, pose);
 }
 // [/clips]
+
+// [rigs]
+/// Import: the rig of the only skin, to be stored with the assets. Meshes are packed for all joints
+/// of the rig.
+Result<PackedRig> importRig(gltf::Model& model, std::vector<PackedMesh>& meshes) {
+  const auto rig = gltf::applyRig(model, 0, model.skins[0].rig);
+  if (!rig) return rig.error();
+  for (const gltf::SkinnedPrimitive& skinned : model.skinnedPrimitives) {
+    const gltf::PrimitiveView view(model.meshes[skinned.mesh].primitives[skinned.primitive]);
+    Result<PackedMesh> mesh = pack(view.mesh(), (*rig)->joints.size());
+    if (!mesh) return mesh.error();
+    meshes.push_back(std::move(*mesh));
+  }
+  return packRig(**rig);
+}
+
+/// Each frame, without a scene: the matrices of driven joints, after those of written ones, and the
+/// weights of driven morph targets.
+Result<void> driveJoints(const PackedRig& rig, std::span<JointMatrix> pose,
+                         std::span<float> weights) {
+  const std::size_t written = rig.writtenJoints();
+  return evaluateRig(rig, pose.first(written), {}, pose.subspan(written), weights);
+}
+// [/rigs]
+
+TEST(DocumentedExampleTest, ARigIsImported) {
+  gltf::Model model =
+      must(gltf::load(std::filesystem::path(test::sourceFolder) / "tests/fuzz/seeds/rig.gltf"));
+  std::vector<PackedMesh> meshes;
+  const PackedRig rig = must(importRig(model, meshes));
+  ASSERT_EQ(meshes.size(), 1u);
+  EXPECT_EQ(rig.drivenJoints(), 5u);
+  std::vector<JointMatrix> pose = gltf::pose(model, 0, gltf::none, 0);
+  pose.resize(pose.size() + rig.drivenJoints());
+  std::vector<float> weights(rig.drivenWeights(), 7.0f);
+  must(driveJoints(rig, pose, weights));
+  EXPECT_NEAR(weights[0], 0, 1e-5) << "in bind pose";
+}
 
 // [clips-root-motion]
 /// Each frame: moves a figure, which is turned by `heading`, by what its clip walked.

@@ -1,13 +1,15 @@
 // libFuzzer: any bytes as a glTF file, without a folder, so that no file is opened. What loads is
-// sampled, viewed, and packed or repaired as well, and its clips are added to itself.
+// sampled, viewed, and packed or repaired as well, its clips are added to itself, and rigs applied.
 #include <dermis/gltf.h>
 #include <dermis/mesh.h>
+#include <dermis/rig.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <span>
+#include <string>
 
 using namespace dermis;
 
@@ -73,6 +75,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::uint32_t skin = 0; skin < model.skins.size() && skin < 4; ++skin) {
       require(gltf::pose(model, skin, globals).size() == model.skins[skin].joints.size());
     }
+  }
+  for (std::uint32_t skin = 0; skin < model.skins.size() && skin < 4; ++skin) {
+    if (model.skins[skin].rig.empty()) continue;
+    const std::string text = model.skins[skin].rig;
+    const auto rig = gltf::applyRig(model, skin, text);
+    require(!rig || packRig(**rig).ok());
   }
   return 0;
 }

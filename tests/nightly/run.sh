@@ -174,7 +174,7 @@ part_libcxx() {
 }
 
 part_fuzz() {
-  fuzzers="clips_fuzz gltf_fuzz mesh_fuzz packed_mesh_fuzz c_calls_fuzz"
+  fuzzers="clips_fuzz gltf_fuzz mesh_fuzz packed_mesh_fuzz rig_fuzz c_calls_fuzz"
   # shellcheck disable=SC2086 # several targets
   build fuzz $fuzzers
   for fuzzer in $fuzzers; do

@@ -25,6 +25,7 @@
 #include "dermis/clips.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 
 namespace dermis::gltf {
 
@@ -56,6 +57,8 @@ struct Skin {
   std::vector<std::uint32_t> joints;
   /// One for each joint, finite. Identities if the file has none.
   std::vector<JointMatrix> inverseBindMatrices;
+  /// JSON text for `applyRig`: `dermis_rig` in the skin's `extras`. Empty if there is none.
+  std::string rig = {};
 };
 
 /// How alpha is used, as in glTF 2.0.
@@ -197,9 +200,12 @@ struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;  ///< empty if the mesh is not decoded (see `load`)
   /// The largest number of morph targets of a primitive, decoded or not. A primitive with fewer has
-  /// the first targets; the others do not displace it.
+  /// the first targets; the others do not displace it. After `applyRig` it does not count those
+  /// that the rig drives, which are the last ones of each primitive.
   std::uint32_t morphTargetCount = 0;
   std::vector<float> morphWeights;  ///< one for each morph target
+  /// `targetNames` in the `extras` of the file's mesh, or empty. It may have any length.
+  std::vector<std::string> morphTargetNames = {};
 };
 
 using dermis::ChannelPath;
@@ -343,6 +349,28 @@ DERMIS_GLTF_API std::optional<std::uint32_t> findClip(const Model& model,
 /// - `limitExceeded` if matching needs more memory than the budget of the other model has left.
 /// `model` is then unchanged.
 DERMIS_GLTF_API Result<std::vector<std::string>> addClips(Model& model, Model from);
+
+/// Reads a rig of a skin, JSON as docs/rigs.md describes it, and applies it to the model:
+/// - The skin keeps the written joints of the rig, in their order. The joints of vertices are those
+///   of the rig: written joints, driven joints of the skin, then those of chains.
+/// - Vertices that follow a chain are bound to it (`bendChain`).
+/// - If a mesh of the skin has some of the morph targets that the rig drives, all of these become
+///   its last ones, in the order of the rig's weights (`InstanceDescription::drivenTargets`). Their
+///   weights are removed from nodes and clips.
+/// - A mesh that nodes with other skins have, too, is copied, so that those stay as they are.
+///
+/// Call it once for a skin, after `addClips`. Returns a view of the rig that owns what it points
+/// to; `packRig` does not fail for it. Given weights are those of the node `RigView::weightsOf`; if
+/// no linear driver reads one, there are none.
+///
+/// Fails, and then leaves the model unchanged, with
+/// - `invalidArgument` if there is no such skin;
+/// - `invalidData` if the text is wrong. The message names the driver by its number and what is
+///   wrong about it;
+/// - `limitExceeded` if there are more than 65,535 joints, more than `maxRigExamples` examples, or
+///   if it needs more memory than the sizes of the model's files and of the text justify.
+DERMIS_GLTF_API Result<std::shared_ptr<const RigView>> applyRig(Model& model, std::uint32_t skin,
+                                                                std::string_view text);
 
 /// The global transforms of all nodes at a time of a clip, in seconds. If `clip` is `none` or does
 /// not exist, it is the rest pose.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gltf/buffers.h"
@@ -32,6 +33,12 @@ class Source {
   const Usage& usage() const { return document_.usage; }
   bool quantized() const { return document_.quantized; }
   Notes& notes() const { return notes_; }
+
+  /// What the `extras` say. That of an object can be taken once.
+  std::vector<std::string> takeTargetNames(std::size_t mesh) {
+    return std::move(document_.targetNames[mesh]);
+  }
+  std::string takeRig(std::size_t skin) { return std::move(document_.rigs[skin]); }
 
   /// Decodes a primitive's data if it is compressed. Call it before the primitive's accessors are
   /// read.

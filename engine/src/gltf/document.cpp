@@ -55,7 +55,10 @@ void checkNesting(std::string_view text, MemoryBudget& budget) {
   spend(budget, bytes, 1, "the JSON text");
 }
 
-json parseJson(std::string_view text) {
+}  // namespace
+
+json parseText(std::string_view text, MemoryBudget& budget) {
+  checkNesting(text, budget);
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
@@ -64,6 +67,8 @@ json parseJson(std::string_view text) {
     failInvalid("the JSON text has a number that is too large");
   }
 }
+
+namespace {
 
 // The parser treats a zero byte as the end of the text.
 std::string_view trimText(std::string_view text, Notes& notes) {
@@ -194,6 +199,36 @@ std::vector<BufferDescription> takeBuffers(json& root) {
   return buffers;
 }
 
+// The property of an object's `extras`, or null. They may be anything.
+const json* findExtra(const json& object, const char* property) {
+  const auto extras = object.find("extras");
+  if (extras == object.end() || !extras->is_object()) return nullptr;
+  const auto found = extras->find(property);
+  return found == extras->end() ? nullptr : &*found;
+}
+
+void readExtras(const json& root, MemoryBudget& budget, Document& document) {
+  static const json nothing = json::array();
+  const auto list = [&](const char* name) -> const json& {
+    return root.contains(name) ? root.at(name) : nothing;
+  };
+  for (const json& mesh : list("meshes")) {
+    std::vector<std::string>& names = document.targetNames.emplace_back();
+    const json* targets = findExtra(mesh, "targetNames");
+    if (targets == nullptr || !targets->is_array()) continue;
+    for (const json& name : *targets) {
+      const std::string text = name.is_string() ? name.get<std::string>() : std::string();
+      spend(budget, text.size() + 2 * sizeof(text), 1, "names of morph targets");
+      names.push_back(text);
+    }
+  }
+  for (const json& skin : list("skins")) {
+    const json* rig = findExtra(skin, "dermis_rig");
+    document.rigs.push_back(rig != nullptr ? rig->dump() : std::string());
+    spend(budget, document.rigs.back().size() + sizeof(std::string), 1, "a rig");
+  }
+}
+
 // Nothing in these is read, so they need not be parsed. The recursion is limited by
 // `deepestNesting`.
 void eraseExtensions(json& value) {
@@ -251,8 +286,7 @@ tinygltf::Model parseContent(json root) {
 Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes,
                        Appearance* appearance) {
   text = trimText(text, notes);
-  checkNesting(text, budget);
-  json root = parseJson(text);
+  json root = parseText(text, budget);
   if (!root.is_object()) failInvalid("the JSON text is not an object");
   checkVersion(root, notes);
 
@@ -262,6 +296,7 @@ Document parseDocument(std::string_view text, MemoryBudget& budget, Notes& notes
   if (appearance != nullptr) *appearance = findAppearance(root, budget);
   document.usage = checkReferences(root, budget, notes);
   document.buffers = takeBuffers(root);
+  readExtras(root, budget, document);
   document.content = parseContent(std::move(root));
   return document;
 }

@@ -66,6 +66,9 @@ struct Document {
   std::vector<BufferDescription> buffers;
   Usage usage;
   bool quantized = false;  ///< KHR_mesh_quantization is in use.
+  /// From `extras`: names of morph targets by mesh, and the JSON text of rigs by skin.
+  std::vector<std::vector<std::string>> targetNames;
+  std::vector<std::string> rigs;
   /// Accessors that Draco streams have filled: the bufferView of the stream, and the attribute's id
   /// there, or `none` for indices.
   std::map<int, std::pair<std::size_t, std::uint32_t>> decodedAccessors;
@@ -73,6 +76,9 @@ struct Document {
 
 struct Appearance;
 class Notes;
+
+/// Parses JSON text. Spends the memory of the result before it is allocated. Throws `Failure`.
+nlohmann::json parseText(std::string_view text, MemoryBudget& budget);
 
 /// Parses and checks the text. Spends the memory of the result before it is allocated. Fills in
 /// `appearance` unless it is null. Throws `Failure`.

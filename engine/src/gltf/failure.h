@@ -1,9 +1,11 @@
-// How this module reports errors internally: a `Failure` is thrown, and `load` and `loadFromMemory`
-// turn it into a `Result`. No exception leaves the module.
+// How this module reports errors internally: a `Failure` is thrown, and `load`, `loadFromMemory`
+// and `applyRig` turn it into a `Result`. No exception leaves the module.
 #pragma once
 
 #include <concepts>
 #include <cstdint>
+#include <exception>
+#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -53,5 +55,21 @@ template <typename... Parts>
 /// Spends memory, or fails with `limitExceeded`. `where` names the allocation in the message.
 void spend(MemoryBudget& budget, std::uint64_t count, std::uint64_t bytesEach,
            std::string_view where);
+
+/// What the function returns. The only place that catches all exceptions: `Failure`s, and whatever
+/// the libraries throw.
+template <typename Value, typename Function>
+Result<Value> guarded(Function function) {
+  try {
+    return function();
+  } catch (Failure& failure) {
+    return std::move(failure.error);
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::limitExceeded, "there is not enough memory for the file"};
+  } catch (const std::exception& exception) {
+    return Error{ErrorCode::invalidData,
+                 join("the file cannot be read: ", shortName(exception.what(), 400))};
+  }
+}
 
 }  // namespace dermis::gltf

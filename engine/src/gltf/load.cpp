@@ -1,5 +1,3 @@
-#include <exception>
-#include <new>
 #include <utility>
 
 #include "dermis/gltf.h"
@@ -48,30 +46,15 @@ Model readModel(std::span<const std::byte> bytes, const std::filesystem::path& f
   return model;
 }
 
-// The only place that catches all exceptions: `Failure`s, and whatever the libraries throw.
-template <typename Function>
-Result<Model> guarded(Function function) {
-  try {
-    return function();
-  } catch (Failure& failure) {
-    return std::move(failure.error);
-  } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::limitExceeded, "there is not enough memory for the file"};
-  } catch (const std::exception& exception) {
-    return Error{ErrorCode::invalidData,
-                 join("the file cannot be read: ", shortName(exception.what(), 400))};
-  }
-}
-
 }  // namespace
 
 Result<Model> loadFromMemory(std::span<const std::byte> bytes, const std::filesystem::path& folder,
                              const LoadOptions& options) {
-  return guarded([&] { return readModel(bytes, folder, options); });
+  return guarded<Model>([&] { return readModel(bytes, folder, options); });
 }
 
 Result<Model> load(const std::filesystem::path& path, const LoadOptions& options) {
-  return guarded([&] {
+  return guarded<Model>([&] {
     // The name is the user's, not a file's: it is not cut.
     const FileToRead file = findFile(path, join("'", oneLine(utf8(path)), "'"));
     // A path without a folder is relative to the current folder. An empty folder would mean that

@@ -137,6 +137,7 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, const Load
   for (const tinygltf::Mesh& from : content.meshes) {
     Mesh& mesh = model.meshes.emplace_back();
     mesh.name = from.name;
+    mesh.morphTargetNames = source.takeTargetNames(model.meshes.size() - 1);
     mesh.morphTargetCount = morphTargetCount(from);
     for (const double weight : from.weights) {
       mesh.morphWeights.push_back(static_cast<float>(weight));

@@ -109,6 +109,7 @@ void readSkins(Source& source, Model& model) {
     source.notes().tolerateUnlessUsed(source.usage().skins[i],
                                       [&] { skin = readSkin(source, from, where); });
     skin.name = from.name;
+    skin.rig = source.takeRig(i);
     const bool oneRoot = std::all_of(skin.joints.begin(), skin.joints.end(), [&](auto joint) {
       return roots[joint] == roots[skin.joints[0]];
     });

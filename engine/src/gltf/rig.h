@@ -1,0 +1,42 @@
+// Rigs as JSON: docs/rigs.md describes the text.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dermis/gltf.h"
+#include "dermis/rig.h"
+#include "gltf/memory_budget.h"
+
+namespace dermis::gltf {
+
+/// A rig, and all arrays that its view points to.
+struct OwnedRig {
+  RigView view;
+  std::vector<RigJoint> joints;
+  std::vector<TwistDriver> twists;
+  std::vector<CorrectiveDriver> correctives;
+  std::vector<ChainDriver> chains;
+  std::vector<LinearDriver> linears;
+  // What the drivers' spans point to.
+  std::vector<std::vector<std::uint32_t>> jointLists, weightLists;
+  std::vector<std::vector<std::array<float, 4>>> rotations;
+  std::vector<std::vector<float>> weights;
+  std::vector<std::vector<JointOffset>> offsets;
+  std::vector<std::vector<JointMatrix>> matrices;
+
+  std::vector<std::uint32_t> places;  ///< by joint of the skin: the joint of the rig
+  std::vector<std::string> driven;    ///< names of driven weights
+};
+
+/// Reads the text for a skin of the model. Throws `Failure`.
+void readRig(const Model& model, std::uint32_t skin, std::string_view text, MemoryBudget& budget,
+             OwnedRig& rig);
+
+/// The morph target of a mesh that has this name; if there is none, with this number. Otherwise
+/// `none`. Throws `Failure` if several have the name.
+std::uint32_t findTarget(const Mesh& mesh, const std::string& name);
+
+}  // namespace dermis::gltf
