@@ -153,9 +153,10 @@ Result<void> animate(const PackedClips& bank, double seconds, float speed,
 Result<PackedRig> importRig(gltf::Model& model, std::vector<PackedMesh>& meshes) {
   const auto rig = gltf::applyRig(model, 0, model.skins[0].rig);
   if (!rig) return rig.error();
+  const auto joints = static_cast<std::uint32_t>((*rig)->joints.size());
   for (const gltf::SkinnedPrimitive& skinned : model.skinnedPrimitives) {
     const gltf::PrimitiveView view(model.meshes[skinned.mesh].primitives[skinned.primitive]);
-    Result<PackedMesh> mesh = pack(view.mesh(), (*rig)->joints.size());
+    Result<PackedMesh> mesh = pack(view.mesh(), joints);
     if (!mesh) return mesh.error();
     meshes.push_back(std::move(*mesh));
   }
