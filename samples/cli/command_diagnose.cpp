@@ -138,7 +138,8 @@ ExitStatus run(const DiagnoseOptions& options) {
   if (options.time && !std::isfinite(*options.time))
     return reportWrongUsage("--time must be a number of seconds");
   const Result<Scene> scene =
-      loadScene(samples::pathOf(options.model), {.strict = options.strict, .clips = options.clips});
+      loadScene(samples::pathOf(options.model),
+                {.strict = options.strict, .clips = options.clips, .rig = "none"});
   if (!scene) return reportModelError(scene.error());
   const Result<std::uint32_t> clip = chooseClip(*scene, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);

@@ -15,6 +15,7 @@ using Json = nlohmann::ordered_json;
 struct InfoOptions {
   std::string model;
   std::vector<std::string> clips;
+  std::string rig;
   bool json = false;
   bool strict = false;
 };
@@ -33,7 +34,7 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["influencesStored"] = primitive.influencesPerVertex();
   json["influencesUsed"] = part.mesh ? part.mesh->packed().info().maxInfluences : 0;
   json["jointsUsed"] = part.mesh ? part.mesh->packed().info().requiredJoints : 0;
-  json["joints"] = scene.model->skins[part.source.skin].joints.size();
+  json["joints"] = jointCount(scene, part.source.skin);
   json["packedBytes"] = part.mesh ? part.mesh->packed().bytes().size() : 0;
   json["problems"] = Json::array();
   static const MeshReport none;
@@ -54,6 +55,18 @@ Json describe(const Scene& scene, const InfoOptions& options) {
   json["skins"] = Json::array();
   for (const gltf::Skin& skin : scene.model->skins) {
     json["skins"].push_back({{"name", skin.name}, {"joints", skin.joints.size()}});
+  }
+  json["rigs"] = Json::array();
+  for (const auto& [skin, rig] : scene.rigs) {
+    json["rigs"].push_back({{"skin", skin},
+                            {"writtenJoints", rig.packed.writtenJoints()},
+                            {"drivenJoints", rig.packed.drivenJoints()},
+                            {"drivenWeights", rig.packed.drivenWeights()},
+                            {"twists", rig.view->twists.size()},
+                            {"correctives", rig.view->correctives.size()},
+                            {"chains", rig.view->chains.size()},
+                            {"linear", rig.view->linears.size()},
+                            {"largestErrorAtExamples", rig.packed.residual()}});
   }
   json["clips"] = Json::array();
   for (std::uint32_t number = 0; number < scene.model->clips.size(); ++number) {
@@ -86,6 +99,14 @@ void printText(const Json& json) {
                  problem["vertices"].get<int>(), text(problem["message"]));
     }
   }
+  for (const Json& rig : json["rigs"]) {
+    fmt::print(
+        "rig    of skin {}: {} joints and {} morph weights driven by {} twists, {} correctives, {} "
+        "chains, {} linear drivers\n",
+        rig["skin"].get<int>(), rig["drivenJoints"].get<int>(), rig["drivenWeights"].get<int>(),
+        rig["twists"].get<int>(), rig["correctives"].get<int>(), rig["chains"].get<int>(),
+        rig["linear"].get<int>());
+  }
   std::size_t number = 0;
   for (const Json& clip : json["clips"]) {
     const std::string file =
@@ -101,7 +122,8 @@ void printText(const Json& json) {
 
 ExitStatus info(const InfoOptions& options) {
   const Result<Scene> scene =
-      loadScene(samples::pathOf(options.model), {.strict = options.strict, .clips = options.clips});
+      loadScene(samples::pathOf(options.model),
+                {.strict = options.strict, .clips = options.clips, .rig = options.rig});
   if (!scene) return reportModelError(scene.error());
   const Json json = describe(*scene, options);
   if (options.json) {
@@ -121,6 +143,7 @@ Run addInfo(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("MODEL", options->model, "A .gltf or .glb file")->required();
   addClipFiles(*command, options->clips);
+  addRigFile(*command, options->rig);
   command->add_flag("--json", options->json, "Print JSON");
   command->add_flag("--strict", options->strict, strictHelp);
   return [options] { return info(*options); };

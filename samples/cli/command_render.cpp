@@ -117,6 +117,7 @@ struct RenderOptions {
   std::string model;
   std::string output;
   std::vector<std::string> clips;
+  std::string rig;
   std::optional<std::string> animation;
   double time = 0;
   std::optional<std::uint32_t> frames;
@@ -448,7 +449,7 @@ samples::RequestedOutput requestedOutput(const RenderOptions& options) {
 /// Checks the output files before anything is drawn.
 ExitStatus checkOutput(const RenderOptions& options) {
   const samples::RequestedOutput output = requestedOutput(options);
-  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips);
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips, options.rig);
       kept != ExitStatus::done)
     return kept;
   if (*samples::render::pictureKind(options.output) == PictureKind::png) return ExitStatus::done;
@@ -462,6 +463,7 @@ ExitStatus renderModel(const RenderOptions& options) {
   MeshPreparation preparation;
   preparation.strict = options.strict;
   preparation.clips = options.clips;
+  preparation.rig = options.rig;
   preparation.images = true;
   preparation.rigidMeshes = true;
   preparation.centersOfRotation = needsCentersOfRotation(*methodFromName(options.method));
@@ -507,6 +509,7 @@ Run addRender(CLI::App& app) {
                    ".mp4, .gif, .apng (with ffmpeg)")
       ->required();
   addClipFiles(*command, options->clips);
+  addRigFile(*command, options->rig);
   command->add_option("--animation", options->animation,
                       "A clip's number, name or FILE:NAME, or none for the rest pose [the first; a "
                       "crowd plays all of them]");

@@ -25,6 +25,7 @@ struct SkinOptions {
   std::string model;
   std::string output;
   std::vector<std::string> clips;
+  std::string rig;
   std::optional<std::string> animation;
   double time = 0;
   std::optional<std::uint32_t> frames;
@@ -126,13 +127,14 @@ ExitStatus writePoses(const SkinOptions& options, const Scene& scene, std::uint3
 ExitStatus skin(const SkinOptions& options) {
   if (const ExitStatus usage = checkUsage(options); usage != ExitStatus::done) return usage;
   const samples::RequestedOutput output{"-o", options.output, options.frames.value_or(1)};
-  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips);
+  if (const ExitStatus kept = checkInput(options.model, {&output, 1}, options.clips, options.rig);
       kept != ExitStatus::done)
     return kept;
   const Method method = *methodFromName(options.method);
   MeshPreparation preparation;
   preparation.strict = options.strict;
   preparation.clips = options.clips;
+  preparation.rig = options.rig;
   preparation.centersOfRotation = needsCentersOfRotation(method);
   preparation.mostCenterTerms = mostCenterTermsAsked;
   preparation.dualQuaternionWeight = static_cast<float>(options.shares.dualQuaternionWeight);
@@ -183,6 +185,7 @@ Run addSkin(CLI::App& app) {
                    "The file to write: .ply, .obj or .glb; with --frames, a name with %04d in it")
       ->required();
   addClipFiles(*command, options->clips);
+  addRigFile(*command, options->rig);
   command->add_option("--animation", options->animation, animationHelp);
   command->add_option("--time", options->time, "Seconds into the clip, clamped to its length [0]");
   CLI::Option* frames =

@@ -22,6 +22,7 @@
 #include "kit/output_file.h"
 #include "kit/program.h"
 #include "kit/text.h"
+#include "rig_verification.h"
 #include "verification.h"
 
 namespace dermis::cli {
@@ -96,7 +97,9 @@ Json describe(const VerifiedCase& verified) {
   json["variant"] = verified.variant;
   json["passed"] = verified.passed();
   if (!verified.passed()) json["failure"] = verified.failure();
-  json[verified.isOfClips() ? "points" : "vertices"] = comparison.compared;
+  json[verified.comparesVertices()      ? "vertices"
+       : verified.method == clipsMethod ? "points"
+                                        : "elements"] = comparison.compared;
   json["onlyFinite"] = comparison.exempt.onlyFinite;
   json["skipped"] = comparison.exempt.skipped;
   json["outOfRange"] = comparison.exempt.outOfRange;
@@ -140,6 +143,14 @@ void printReport(const std::vector<ModelVerification>& models) {
       if (method == clipsMethod) {
         fmt::print(
             "{}  {}  {}: {} plays, {} points and morph weights compared{}; worst {:.2f} of "
+            "its bound\n",
+            summary.failures == 0 ? "passed" : "FAILED", samples::oneLine(model.model), method,
+            summary.poses.size(), summary.vertices, exceptions(summary), summary.worstPosition);
+        continue;
+      }
+      if (method == rigMethod) {
+        fmt::print(
+            "{}  {}  {}: {} poses, {} driven joints and morph weights compared{}; worst {:.2f} of "
             "its bound\n",
             summary.failures == 0 ? "passed" : "FAILED", samples::oneLine(model.model), method,
             summary.poses.size(), summary.vertices, exceptions(summary), summary.worstPosition);
@@ -221,6 +232,7 @@ Result<void> writeJunitReport(const std::filesystem::path& path,
 
 struct VerifyOptions {
   std::vector<std::string> models;
+  std::string rig;
   std::string device = "auto";
   std::string json;
   std::string junit;
@@ -249,6 +261,7 @@ class Verifier {
            std::span<const samples::RequestedOutput> reports)
       : pool_(pool), reports_(reports), coverage_(options.coverage()) {
     preparation_.strict = options.strict;
+    preparation_.rig = options.rig;
     preparation_.centersOfRotation = true;
   }
 
@@ -291,17 +304,22 @@ class Verifier {
     const SceneCases cases = casesOf(*scene, pool_.first(), poses.size(), coverage_);
     samples::Progress progress(model, cases.batches.size());
     Cases verified = verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); });
+    if (verified) verified = with(verifyRigs(*scene, poses), std::move(*verified));
     if (verified) verified = withClips(*scene, std::move(*verified));
     add(model, std::move(verified));
+  }
+
+  static Cases with(Cases others, std::vector<VerifiedCase> cases) {
+    if (!others) return others;
+    std::ranges::move(*others, std::back_inserter(cases));
+    return cases;
   }
 
   Cases withClips(const Scene& scene, std::vector<VerifiedCase> cases) {
     std::vector<std::string> warnings;
     Cases ofClips = verifyClips(pool_, scene, coverage_, warnings);
-    if (!ofClips) return ofClips;
     for (const std::string& warning : warnings) reportWarning(warning);
-    std::ranges::move(*ofClips, std::back_inserter(cases));
-    return cases;
+    return with(std::move(ofClips), std::move(cases));
   }
 
   void add(const std::string& model, Cases cases) {
@@ -405,6 +423,7 @@ ExitStatus verify(const VerifyOptions& options) {
       {{"--json", options.json}, {"--junit", options.junit}}};
   std::vector<std::filesystem::path> inputs;
   for (const std::string& model : options.models) inputs.push_back(samples::pathOf(model));
+  if (!options.rig.empty()) inputs.push_back(samples::pathOf(options.rig));
   if (const Result<void> kept = samples::checkOutputFiles(outputFiles, inputs); !kept)
     return reportWrongUsage(kept.error().message);
   const auto makeTarget = [&options]() -> Result<std::shared_ptr<samples::BatchTarget>> {
@@ -428,6 +447,7 @@ Run addVerify(CLI::App& app) {
                          "instances per invocation), and compare with the reference");
   const auto options = std::make_shared<VerifyOptions>();
   command->add_option("MODEL", options->models, "One or more .gltf or .glb files [random meshes]");
+  addRigFile(*command, options->rig);
   command->add_flag("--random", options->random,
                     "Also verify random meshes, with other input formats and unusual sizes");
   command->add_flag("--quick", options->quick,

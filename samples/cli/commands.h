@@ -39,11 +39,20 @@ inline void addClipFiles(CLI::App& command, std::vector<std::string>& files) {
       ->allow_extra_args(false);  // A model may follow.
 }
 
-/// Reports wrong usage if an output would overwrite the model or a file of --clips.
+/// Adds --rig.
+inline void addRigFile(CLI::App& command, std::string& file) {
+  command.add_option("--rig", file,
+                     "A JSON file with drivers of joints and morph weights, or none [dermis_rig in "
+                     "the extras of the model's skins]");
+}
+
+/// Reports wrong usage if an output would overwrite the model, a file of --clips or that of --rig.
 inline ExitStatus checkInput(const std::string& model,
                              std::span<const samples::RequestedOutput> outputs,
-                             const std::vector<std::string>& clips = {}) {
+                             const std::vector<std::string>& clips = {},
+                             const std::string& rig = {}) {
   std::vector<std::filesystem::path> inputs{samples::pathOf(model)};
+  if (!rig.empty()) inputs.push_back(samples::pathOf(rig));
   for (const std::string& file : clips) inputs.push_back(samples::pathOf(file));
   const Result<void> kept = samples::checkOutputFiles(outputs, inputs);
   return kept ? ExitStatus::done : reportWrongUsage(kept.error().message);

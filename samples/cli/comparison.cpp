@@ -141,6 +141,8 @@ class MethodComparer {
   Result<MethodComparison> compare(const ComparisonTimer& timer) {
     if (Result<void> done = compareShapes(); !done) return done.error();
     if (Result<void> done = compareOnModel(); !done) return done.error();
+    if (Result<void> done = compareCurved(timer.isCpu || timer.device != nullptr); !done)
+      return done.error();
     if (timer.isCpu) {
       if (Result<void> done = timeOnCpu(); !done) return done.error();
     }
@@ -209,6 +211,70 @@ class MethodComparer {
       compared.rootMeanSquareDifference =
           std::sqrt(differences.squares / static_cast<double>(differences.count)) / size;
     }
+    return {};
+  }
+
+  /// The median time of a call, over the repetitions.
+  template <typename Run>
+  Result<double> secondsOf(const Run& run) const {
+    using Timer = std::chrono::steady_clock;
+    std::vector<double> seconds;
+    for (std::uint32_t repetition = 0; repetition < options_.repetitions; ++repetition) {
+      const auto begin = Timer::now();
+      if (Result<void> done = run(); !done) return done.error();
+      seconds.push_back(std::chrono::duration<double>(Timer::now() - begin).count());
+    }
+    return medianOf(std::move(seconds));
+  }
+
+  /// Skins copies of the tube in bind pose with dual quaternions.
+  Result<double> secondsPerVertex(const PackedMesh& packed, std::span<const JointMatrix> pose) {
+    constexpr std::size_t copies = 16;
+    const Result<cpu::Mesh> mesh = cpu::Mesh::create(packed);
+    if (!mesh) return mesh.error();
+    const Result<VertexPlaces> places = placeVertices(VertexLayout{}, packed.vertexCount());
+    if (!places) return places.error();
+    std::vector<std::byte> output(places->size * copies);
+    std::vector<cpu::Instance> instances(copies);
+    for (std::size_t i = 0; i < copies; ++i) {
+      instances[i].pose = pose;
+      instances[i].promise = JointPromise::scaleIgnored;
+      instances[i].output.fill(output.data() + places->size * i);
+    }
+    cpu::Job job;
+    job.mesh = &*mesh;
+    job.places = *places;
+    job.instances = instances;
+    job.method = Method::dualQuaternion;
+    const Result<double> seconds = secondsOf([&] { return cpu::skin(job); });
+    if (!seconds) return seconds;
+    return *seconds / static_cast<double>(copies * packed.vertexCount());
+  }
+
+  Result<void> compareCurved(bool isTimed) {
+    const Result<CurvedTube> tube = makeCurvedTube();
+    if (!tube) return tube.error();
+    CurvedComparison& curved = comparison_.curved;
+    curved.tube = tube->shape;
+    if (!isTimed) return {};
+    constexpr int poses = 1000;
+    std::vector<JointMatrix> pose(3 + tube->rig.drivenJoints());
+    const Result<double> perPose = secondsOf([&]() -> Result<void> {
+      for (int i = 0; i < poses; ++i) {
+        const Result<void> done =
+            evaluateRig(tube->rig, std::span(pose).first(3), {}, std::span(pose).subspan(3), {});
+        if (!done) return done;
+      }
+      return {};
+    });
+    if (!perPose) return perPose.error();
+    const Result<double> perVertex = secondsPerVertex(tube->mesh, pose);
+    if (!perVertex) return perVertex.error();
+    const Result<double> straight = secondsPerVertex(tube->straight, std::span(pose).first(2));
+    if (!straight) return straight.error();
+    curved.secondsPerPose = *perPose / poses;
+    curved.secondsPerVertex = *perVertex;
+    curved.secondsPerStraight = *straight;
     return {};
   }
 

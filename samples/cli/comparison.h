@@ -31,6 +31,15 @@ struct ComparedMethod {
 enum class Clock : std::uint8_t { none, timestamps, submission, oneThread };
 enum class InstructionSource : std::uint8_t { driver, spirv };
 
+/// Dual quaternions on the tube of `makeCurvedTube`. Times are those of one thread of the CPU, for
+/// a pose and for a vertex; empty if nothing is timed.
+struct CurvedComparison {
+  TubeComparison tube;
+  std::optional<double> secondsPerPose;      ///< to compute the driven joints
+  std::optional<double> secondsPerVertex;    ///< to skin
+  std::optional<double> secondsPerStraight;  ///< the same without the chain
+};
+
 struct MethodComparison {
   std::uint32_t instances = 0;
   std::uint64_t vertices = 0;  ///< of one instance
@@ -40,6 +49,7 @@ struct MethodComparison {
   Clock clock = Clock::none;
   InstructionSource instructionSource = InstructionSource::spirv;
   std::vector<ComparedMethod> methods;  ///< in the order of `allMethods`
+  CurvedComparison curved;
 };
 
 struct ComparisonOptions {

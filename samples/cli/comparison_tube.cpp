@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <numbers>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -175,15 +176,21 @@ TubeShape shapeOf(const Points& points, const Points& rest, const glm::dmat3& tu
   return shape;
 }
 
-Result<TubeShape> turnTube(const Tube& tube, const glm::dmat3& turn, Method method,
-                           const MethodShares& shares) {
-  const MeshView mesh = tube.view(shares);
-  const std::array<JointMatrix, 2> still{}, turned{JointMatrix{}, turnAboutMiddle(turn)};
+/// The tube in two poses, of all joints that move it.
+Result<TubeShape> shapeOf(const MeshView& mesh, std::span<const JointMatrix> still,
+                          std::span<const JointMatrix> turned, const glm::dmat3& turn,
+                          Method method) {
   const Result<reference::SkinnedMesh> rest = reference::skin(mesh, still, method);
   if (!rest) return rest.error();
   const Result<reference::SkinnedMesh> skinned = reference::skin(mesh, turned, method);
   if (!skinned) return skinned.error();
   return shapeOf(pointsOf(*skinned), pointsOf(*rest), turn);
+}
+
+Result<TubeShape> turnTube(const Tube& tube, const glm::dmat3& turn, Method method,
+                           const MethodShares& shares) {
+  const std::array<JointMatrix, 2> still{}, turned{JointMatrix{}, turnAboutMiddle(turn)};
+  return shapeOf(tube.view(shares), still, turned, turn, method);
 }
 
 }  // namespace
@@ -197,6 +204,44 @@ Result<TubeComparison> compareTube(Method method, const MethodShares& shares) {
   const Result<TubeShape> bent = turnTube(tube, bendBy(tubeBendDegrees * degree), method, shares);
   if (!bent) return bent.error();
   return TubeComparison{*twisted, *bent};
+}
+
+Result<CurvedTube> makeCurvedTube() {
+  constexpr std::uint32_t jointCount = 3 + tubeSegments - 1;
+  std::array<RigJoint, jointCount> joints{};
+  joints[1].bind.m[0][3] = static_cast<float>(middle.x);
+  joints[2].bind.m[0][3] = static_cast<float>(tubeLength);
+  constexpr std::array<std::uint32_t, 3> along{0, 1, 2};
+  const ChainDriver chain{along, 3, tubeSegments};
+  RigView view;
+  view.joints = joints;
+  view.writtenJoints = 3;
+  view.chains = {&chain, 1};
+  Result<PackedRig> rig = packRig(view);
+  if (!rig) return rig.error();
+  const Tube tube;
+  const Result<RepairedMesh> bound = bendChain(tube.view({}), joints, chain);
+  if (!bound) return bound.error();
+  Result<PackedMesh> mesh = pack(bound->view(), jointCount);
+  if (!mesh) return mesh.error();
+  Result<PackedMesh> straight = pack(tube.view({}), 2);
+  if (!straight) return straight.error();
+
+  const auto shape = [&](const glm::dmat3& turn) -> Result<TubeShape> {
+    const std::array<JointMatrix, jointCount> still{};
+    std::array<JointMatrix, jointCount> turned{};
+    turned[1] = turned[2] = turnAboutMiddle(turn);
+    const Result<void> done =
+        evaluateRig(*rig, std::span(turned).first<3>(), {}, std::span(turned).subspan<3>(), {});
+    if (!done) return done.error();
+    return shapeOf(bound->view(), still, turned, turn, Method::dualQuaternion);
+  };
+  constexpr double degree = std::numbers::pi / 180;
+  const Result<TubeShape> twisted = shape(twistBy(tubeTwistDegrees * degree));
+  if (!twisted) return twisted.error();
+  const Result<TubeShape> bent = shape(bendBy(tubeBendDegrees * degree));
+  if (!bent) return bent.error();
+  return CurvedTube{std::move(*rig), std::move(*mesh), std::move(*straight), {*twisted, *bent}};
 }
 
 }  // namespace dermis::cli

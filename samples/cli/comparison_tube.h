@@ -2,8 +2,12 @@
 // can be checked against theory.
 #pragma once
 
+#include <cstdint>
+
 #include "dermis/layout.h"
+#include "dermis/mesh.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 #include "method_options.h"
 
 namespace dermis::cli {
@@ -34,5 +38,16 @@ struct TubeComparison {
 /// zone of length 0.4 about its middle, where the second joint is. The origin of bind space is at
 /// one end of the tube. Centers of rotation are the centers of the rings.
 Result<TubeComparison> compareTube(Method method, const MethodShares& shares);
+
+inline constexpr std::uint32_t tubeSegments = 16;
+
+/// The tube bound to a chain through its joints and its end.
+struct CurvedTube {
+  PackedRig rig;              ///< three written joints
+  PackedMesh mesh, straight;  ///< bound to the chain, and to the two joints
+  TubeComparison shape;       ///< with `dualQuaternion`
+};
+
+Result<CurvedTube> makeCurvedTube();
 
 }  // namespace dermis::cli

@@ -72,7 +72,8 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
   description.tuning = device_->context.tuning();
   std::uint64_t joints = 0, outputs = 0, meshes = 0;
   std::uint32_t instances = 0;
-  for (const gltf::Skin& skin : scene_->model->skins) joints += skin.joints.size();
+  for (std::uint32_t skin = 0; skin < scene_->model->skins.size(); ++skin)
+    joints += jointCount(*scene_, skin);
   for (const ScenePart& part : scene_->parts) {
     if (part.mesh == nullptr) continue;
     // The offset of each attribute is a multiple of its stride.
@@ -153,8 +154,7 @@ Result<void> DrawnScene::addFigure(Method method) {
   for (std::size_t index = 0; index < shared_.size(); ++index) {
     const std::uint32_t skin = scene_->parts[index].source.skin;
     if (!shared_[index].mesh || isUsed[skin]) continue;
-    const auto joints = static_cast<std::uint32_t>(scene_->model->skins[skin].joints.size());
-    Result<PoseHandle> palette = recorder_->scene().addPose(joints);
+    Result<PoseHandle> palette = recorder_->scene().addPose(jointCount(*scene_, skin));
     if (!palette) return palette.error();
     figure.poses[skin] = *palette;
     isUsed[skin] = true;

@@ -34,6 +34,9 @@ struct MeshPreparation {
   bool rigidMeshes = false;  ///< read rigid meshes that hang on skeletons
   /// Names of files whose clips are added to those of the model.
   std::vector<std::string> clips = {};
+  /// Name of a file with a rig for the skins that have its joints, or "none". Empty: the rigs that
+  /// the model's skins have in their `extras`.
+  std::string rig = {};
 };
 
 /// The limit if the user named a method that needs centers of rotation.

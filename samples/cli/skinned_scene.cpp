@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <tuple>
@@ -12,6 +15,7 @@
 
 #include "kit/file_name.h"
 #include "kit/memory_left.h"
+#include "kit/program.h"
 #include "kit/text.h"
 #include "prepared_mesh.h"
 
@@ -89,8 +93,7 @@ class Preparer {
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     const auto [named, isNew] = namedJoints_.emplace(source.mesh, 0);
     if (isNew) named->second = joints_.of(model.meshes[source.mesh]);
-    const auto joints =
-        std::min(static_cast<std::uint32_t>(model.skins[source.skin].joints.size()), named->second);
+    const std::uint32_t joints = std::min(jointCount(scene_, source.skin), named->second);
     std::shared_ptr<const PreparedMesh>& mesh = prepared_[{&primitive, joints}];
     if (mesh != nullptr) return mesh;
     // Centers of rotation depend on all primitives of the mesh.
@@ -127,13 +130,70 @@ class Preparer {
       shared_;
 };
 
-/// `file` is the file's name, for messages.
-Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
-                           const MeshPreparation& preparation) {
-  Scene scene;
-  scene.model = std::make_unique<gltf::Model>(std::move(loaded));
+Result<void> addClips(Scene& scene, const MeshPreparation& preparation) {
+  for (const std::string& name : preparation.clips) {
+    const std::filesystem::path path = samples::pathOf(name);
+    Result<gltf::Model> loaded = gltf::load(path, {.strict = preparation.strict});
+    if (!loaded) return loaded.error();
+    const std::string file = samples::inQuotes(nameOf(path));
+    const auto add = [&](const std::vector<std::string>& notes) {
+      for (const std::string& note : notes)
+        scene.notes.push_back(fmt::format("{}: {}", file, note));
+    };
+    add(loaded->notes);
+    scene.clipFiles.push_back({path, static_cast<std::uint32_t>(scene.model->clips.size())});
+    const Result<std::vector<std::string>> notes = gltf::addClips(*scene.model, std::move(*loaded));
+    if (!notes)
+      return Error{notes.error().code, fmt::format("{}: {}", file, notes.error().message)};
+    add(*notes);
+  }
+  return {};
+}
+
+Result<std::string> readText(const std::string& name) {
+  std::ifstream file(samples::pathOf(name), std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file.is_open() || file.bad())
+    return Error{ErrorCode::ioError, fmt::format("cannot read {}", samples::inQuotes(name))};
+  return text;
+}
+
+/// Applies the rigs of the skins that are used. A rig of a file of its own is for those that have
+/// its joints, at least one.
+Result<void> addRigs(Scene& scene, const std::string& file, const MeshPreparation& preparation) {
+  if (preparation.rig == "none") return {};
+  std::optional<std::string> own;
+  if (!preparation.rig.empty()) {
+    Result<std::string> text = readText(preparation.rig);
+    if (!text) return text.error();
+    own = std::move(*text);
+  }
   gltf::Model& model = *scene.model;
-  scene.notes = model.notes;
+  std::set<std::uint32_t> skins;
+  for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) skins.insert(source.skin);
+  std::vector<Error> errors;
+  for (const std::uint32_t skin : skins) {
+    const std::string text = own ? *own : model.skins[skin].rig;
+    if (text.empty() && !own) continue;
+    Result<std::shared_ptr<const RigView>> view = gltf::applyRig(model, skin, text);
+    if (view) {
+      scene.rigs.emplace(skin, SceneRig{*view, samples::must(packRig(**view))});
+      continue;
+    }
+    const std::string name = own ? nameOf(samples::pathOf(preparation.rig)) : file;
+    const Error error{view.error().code, fmt::format("{}: skin {}: {}", samples::inQuotes(name),
+                                                     skin, view.error().message)};
+    if (!own) return error;
+    errors.push_back(error);
+  }
+  if (own && scene.rigs.empty() && !errors.empty()) return errors.front();
+  for (const Error& error : errors) scene.notes.push_back(error.message + "; it has no rig");
+  return {};
+}
+
+/// Makes the parts. `file` is the file's name, for messages.
+Result<void> addParts(Scene& scene, const std::string& file, const MeshPreparation& preparation) {
+  gltf::Model& model = *scene.model;
   const auto inFile = [&file](const Error& error) {
     return Error{error.code, fmt::format("{}: {}", samples::inQuotes(file), error.message)};
   };
@@ -159,27 +219,21 @@ Result<Scene> prepareScene(gltf::Model loaded, const std::string& file,
     }
     scene.parts.push_back(std::move(part));
   }
-  return scene;
+  return {};
 }
 
-Result<void> addClips(Scene& scene, const MeshPreparation& preparation) {
-  for (const std::string& name : preparation.clips) {
-    const std::filesystem::path path = samples::pathOf(name);
-    Result<gltf::Model> loaded = gltf::load(path, {.strict = preparation.strict});
-    if (!loaded) return loaded.error();
-    const std::string file = samples::inQuotes(nameOf(path));
-    const auto add = [&](const std::vector<std::string>& notes) {
-      for (const std::string& note : notes)
-        scene.notes.push_back(fmt::format("{}: {}", file, note));
-    };
-    add(loaded->notes);
-    scene.clipFiles.push_back({path, static_cast<std::uint32_t>(scene.model->clips.size())});
-    const Result<std::vector<std::string>> notes = gltf::addClips(*scene.model, std::move(*loaded));
-    if (!notes)
-      return Error{notes.error().code, fmt::format("{}: {}", file, notes.error().message)};
-    add(*notes);
-  }
-  return {};
+/// Makes a scene of a model.
+Result<Scene> makeScene(gltf::Model loaded, const std::filesystem::path& path,
+                        const MeshPreparation& preparation) {
+  Scene scene;
+  scene.model = std::make_unique<gltf::Model>(std::move(loaded));
+  scene.notes = scene.model->notes;
+  scene.clipFiles.push_back({path});
+  Result<void> done = addClips(scene, preparation);
+  if (done) done = addRigs(scene, nameOf(path), preparation);
+  if (done) done = addParts(scene, nameOf(path), preparation);
+  if (!done) return done.error();
+  return scene;
 }
 
 /// The first clip with this name in each file that is called `file`, or in all if it is empty.
@@ -213,11 +267,7 @@ Result<Scene> loadScene(const std::filesystem::path& path, const MeshPreparation
                                                  .rigidMeshes = preparation.rigidMeshes,
                                                  .strict = preparation.strict});
   if (!loaded) return loaded.error();
-  Result<Scene> scene = prepareScene(std::move(*loaded), nameOf(path), preparation);
-  if (!scene) return scene;
-  scene->clipFiles.push_back({path});
-  if (Result<void> added = addClips(*scene, preparation); !added) return added.error();
-  return scene;
+  return makeScene(std::move(*loaded), path, preparation);
 }
 
 Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name,
@@ -225,9 +275,13 @@ Result<Scene> loadScene(std::span<const std::byte> file, const std::string& name
   Result<gltf::Model> loaded =
       gltf::loadFromMemory(file, {}, {.images = preparation.images, .strict = preparation.strict});
   if (!loaded) return loaded.error();
-  Result<Scene> scene = prepareScene(std::move(*loaded), name, preparation);
-  if (scene) scene->clipFiles.push_back({name});
-  return scene;
+  return makeScene(std::move(*loaded), name, preparation);
+}
+
+std::uint32_t jointCount(const Scene& scene, std::uint32_t skin) {
+  const auto rig = scene.rigs.find(skin);
+  const std::size_t driven = rig == scene.rigs.end() ? 0 : rig->second.packed.drivenJoints();
+  return static_cast<std::uint32_t>(scene.model->skins[skin].joints.size() + driven);
 }
 
 bool allows(const Scene& scene, Method method) {
@@ -267,19 +321,65 @@ Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::st
                   samples::inQuotes(*wanted), all)};
 }
 
+namespace {
+
+RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time,
+                  std::span<const Transform> globals) {
+  const SceneRig& rig = scene.rigs.at(skin);
+  RigInput input{gltf::pose(*scene.model, skin, globals), {}};
+  if (rig.packed.givenWeights() != 0)
+    input.givenWeights = gltf::morphWeights(*scene.model, rig.view->weightsOf, clip, time);
+  return input;
+}
+
+/// The pose of a skin with a rig, and the weights that the rig drives.
+struct DrivenPose {
+  std::vector<JointMatrix> palette;
+  std::vector<float> weights;
+};
+
+DrivenPose drive(const PackedRig& rig, const RigInput& input) {
+  DrivenPose pose{input.written, {}};
+  pose.palette.resize(input.written.size() + rig.drivenJoints());
+  std::vector<float> weights(input.givenWeights.size() + rig.drivenWeights());
+  samples::must(evaluateRig(rig, input.written, input.givenWeights,
+                            std::span(pose.palette).subspan(input.written.size()), weights));
+  pose.weights.assign(weights.end() - rig.drivenWeights(), weights.end());
+  return pose;
+}
+
+}  // namespace
+
+RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time) {
+  return rigInput(scene, skin, clip, time, gltf::nodeGlobals(*scene.model, clip, time));
+}
+
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time) {
   const std::vector<Transform> globals = gltf::nodeGlobals(*scene.model, clip, time);
   ScenePose pose;
   pose.poses.resize(scene.model->skins.size());
+  std::map<std::uint32_t, std::vector<float>> driven;  // by skin: weights
   for (const ScenePart& part : scene.parts) {
-    std::vector<JointMatrix>& palette = pose.poses[part.source.skin];
-    if (palette.empty()) palette = gltf::pose(*scene.model, part.source.skin, globals);
+    const std::uint32_t skin = part.source.skin;
+    std::vector<JointMatrix>& palette = pose.poses[skin];
+    if (palette.empty()) {
+      const auto rig = scene.rigs.find(skin);
+      if (rig == scene.rigs.end()) {
+        palette = gltf::pose(*scene.model, skin, globals);
+      } else {
+        DrivenPose posed = drive(rig->second.packed, rigInput(scene, skin, clip, time, globals));
+        palette = std::move(posed.palette);
+        driven[skin] = std::move(posed.weights);
+      }
+    }
     std::vector<MorphWeight>& morphs = pose.morphs.emplace_back();
     // A primitive may have fewer targets than the mesh has weights.
     const std::size_t targets = part.primitive->morphTargets.size();
     if (targets == 0) continue;
-    const std::vector<float> weights =
-        gltf::morphWeights(*scene.model, part.source.node, clip, time);
+    std::vector<float> weights = gltf::morphWeights(*scene.model, part.source.node, clip, time);
+    // Those that a rig drives are the last ones.
+    if (targets > weights.size())
+      weights.insert(weights.end(), driven[skin].begin(), driven[skin].end());
     for (std::uint32_t target = 0; target < weights.size() && target < targets; ++target) {
       if (weights[target] != 0) morphs.push_back({target, weights[target]});
     }

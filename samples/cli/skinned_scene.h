@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 
 #include "dermis/gltf.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 #include "prepared_mesh.h"
 
 namespace dermis::cli {
@@ -31,9 +33,16 @@ struct ClipFile {
   std::uint32_t firstClip = 0;  ///< its clips end where those of the next file begin
 };
 
+/// The rig of a skin.
+struct SceneRig {
+  std::shared_ptr<const RigView> view;
+  PackedRig packed;
+};
+
 struct Scene {
   std::unique_ptr<gltf::Model> model;
-  std::vector<ClipFile> clipFiles;  ///< the model's own file, then those of `--clips`
+  std::map<std::uint32_t, SceneRig> rigs;  ///< by skin
+  std::vector<ClipFile> clipFiles;         ///< the model's own file, then those of `--clips`
   std::vector<ScenePart> parts;
   std::vector<std::string> warnings;  ///< repairs, and centers of rotation that were not computed
   std::vector<std::string> remarks;   ///< problems that `validate` counts and `pack` handles
@@ -41,10 +50,14 @@ struct Scene {
                                       ///< out or not skinned
 };
 
+/// The number of joints of a pose: those of the skin, and those that its rig drives.
+std::uint32_t jointCount(const Scene& scene, std::uint32_t skin);
+
 /// Whether every part has the data that the method needs.
 bool allows(const Scene& scene, Method method);
 
-/// Reads a model, packs its skinned primitives, and adds the clips of other files. Invalid values
+/// Reads a model, adds the clips of other files, applies rigs, and packs its skinned primitives.
+/// Invalid values
 /// are repaired with a warning, and broken rules give a note; if the preparation is strict, both
 /// are refused. Fails with `limitExceeded` if the combinations of nodes, primitives and skins need
 /// more memory than the size of the file justifies.
@@ -62,7 +75,7 @@ std::size_t fileOfClip(const Scene& scene, std::uint32_t clip);
 /// files have it.
 Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::string>& wanted);
 
-/// The pose of a scene at one time.
+/// The pose of a scene at one time, with what its rigs drive.
 struct ScenePose {
   std::vector<std::vector<JointMatrix>> poses;   ///< by skin; empty if no part uses it
   std::vector<std::vector<MorphWeight>> morphs;  ///< by part: the active morph targets
@@ -71,6 +84,14 @@ struct ScenePose {
     return poses[part.source.skin];
   }
 };
+
+/// What the rig of a skin reads at one time.
+struct RigInput {
+  std::vector<JointMatrix> written;
+  std::vector<float> givenWeights;
+};
+
+RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time);
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time);
 

@@ -279,14 +279,17 @@ class PoseVerifier {
 
 std::string VerifiedCase::failure() const {
   std::string text;
-  if (comparison.failures != 0 && isOfClips()) {
+  if (comparison.failures != 0 && !comparesVertices()) {
     const bool areWeights = variant == weightsVariant;
     text = fmt::format(
         "{} {} are outside their bound; the first is {} {}. Largest error divided by its bound: "
         "{:.3g} ({} {})",
-        comparison.failures, areWeights ? "weights" : "points", areWeights ? "weight" : "of joint",
-        comparison.firstFailure, comparison.worstPosition, areWeights ? "weight" : "joint",
-        comparison.worstPositionVertex);
+        comparison.failures,
+        areWeights            ? "weights"
+        : method == rigMethod ? "joints"
+                              : "points",
+        areWeights ? "weight" : "of joint", comparison.firstFailure, comparison.worstPosition,
+        areWeights ? "weight" : "joint", comparison.worstPositionVertex);
   } else if (comparison.failures != 0) {
     text = fmt::format(
         "{} vertices are outside their bound; the first is {}. Largest error divided by its bound: "

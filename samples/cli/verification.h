@@ -52,12 +52,14 @@ struct SceneCases {
 SceneCases sceneCases(std::vector<Figure> figures, std::vector<samples::Division> divisions,
                       std::vector<OutputToVerify> outputs, std::size_t poseCount);
 
-inline constexpr const char* clipsMethod = "clips";  ///< of cases that compare no vertices
-inline constexpr const char* weightsVariant = "morph weights";  ///< of cases of clips
+// Of cases that compare no vertices.
+inline constexpr const char* clipsMethod = "clips";
+inline constexpr const char* rigMethod = "rig";
+inline constexpr const char* weightsVariant = "morph weights";
 
 /// One primitive in one pose, with one method and one output layout. Or what a figure that plays
-/// clips has as the pose of a skin or the morph weights of a node: then `comparison` counts points
-/// or weights, and its vertices are joints or weights.
+/// clips has as the pose of a skin or the morph weights of a node, or what a rig drives: then
+/// `comparison` counts points, joints or weights, and its vertices are joints or weights.
 struct VerifiedCase {
   std::string part;
   std::string method;
@@ -71,7 +73,7 @@ struct VerifiedCase {
     return comparison.passed() && wrong.empty() &&
            comparison.compared + comparison.exempt.onlyFinite != 0;
   }
-  bool isOfClips() const { return method == clipsMethod; }
+  bool comparesVertices() const { return method != clipsMethod && method != rigMethod; }
   std::string failure() const;  ///< a sentence, if it did not pass
 };
 
