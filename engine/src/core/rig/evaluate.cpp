@@ -10,6 +10,7 @@
 #include "strict_floating_point.h"
 
 namespace dermis {
+namespace rigs {
 namespace {
 
 float squareRoot(float square) {
@@ -46,6 +47,11 @@ struct PoseMemory {
   void setWeight(std::size_t number, float value) { weights[number] = value; }
 };
 
+}  // namespace
+}  // namespace rigs
+
+namespace {
+
 Result<void> checkSize(std::size_t size, std::size_t expected, const char* what) {
   if (size == expected) return {};
   return Error{ErrorCode::invalidArgument, "evaluateRig: there are " + std::to_string(size) + " " +
@@ -68,10 +74,10 @@ Result<void> evaluateRig(const PackedRig& rig, std::span<const JointMatrix> writ
                      "weights in all");
   if (!good) return good;
   std::ranges::copy(givenWeights, weights.begin());
-  std::vector<Quat<float>> rotations(header.mostInputs);
+  std::vector<rigs::Quat<float>> rotations(header.mostInputs);
   std::vector<float> basis(maxRigExamples);
-  PoseMemory memory{written, driven, weights};
-  evaluateDrivers<float>(blob, rotations, basis, memory);
+  rigs::PoseMemory memory{written, driven, weights};
+  rigs::evaluateDrivers<float>(blob, rotations, basis, memory);
   return {};
 }
 

@@ -23,7 +23,7 @@ using math::Vec3;
 using math::Vec4;
 using Matrix = Affine<double>;
 
-Error invalid(const std::string& what) {
+Error badRig(const std::string& what) {
   return {ErrorCode::invalidArgument, "packRig: " + what};
 }
 
@@ -183,21 +183,21 @@ class RigPacker {
                                                  std::to_string(maxPoseJoints)};
     }
     if (rig_.writtenJoints == 0 || rig_.writtenJoints > count) {
-      return invalid("of " + std::to_string(count) + " joints " +
-                     std::to_string(rig_.writtenJoints) + " are written");
+      return badRig("of " + std::to_string(count) + " joints " +
+                    std::to_string(rig_.writtenJoints) + " are written");
     }
     // A number of weights that no driver drives is refused later; this bounds what is made.
     if (rig_.drivenWeights > 0xffffffffu - rig_.givenWeights)
-      return invalid("there are too many weights");
+      return badRig("there are too many weights");
     for (std::size_t joint = 0; joint < count; ++joint) {
       const RigJoint& record = rig_.joints[joint];
       if (!isFinite(record.bind)) {
-        return invalid("the bind matrix of joint " + std::to_string(joint) +
-                       " has a number that is not finite");
+        return badRig("the bind matrix of joint " + std::to_string(joint) +
+                      " has a number that is not finite");
       }
       if (record.parent != abi::RIG_NO_JOINT && record.parent >= count) {
-        return invalid("joint " + std::to_string(record.parent) + ", the parent of joint " +
-                       std::to_string(joint) + ", does not exist");
+        return badRig("joint " + std::to_string(record.parent) + ", the parent of joint " +
+                      std::to_string(joint) + ", does not exist");
       }
     }
     std::vector<bool> hasRoot(count);  // it is not part of a cycle, nor below one
@@ -206,8 +206,8 @@ class RigPacker {
       for (std::uint32_t above = joint; above != abi::RIG_NO_JOINT && !hasRoot[above];
            above = rig_.joints[above].parent) {
         if (++steps > count) {
-          return invalid("joint " + std::to_string(joint) +
-                         " is part of, or below, a cycle of parents");
+          return badRig("joint " + std::to_string(joint) +
+                        " is part of, or below, a cycle of parents");
         }
       }
       for (std::uint32_t above = joint; above != abi::RIG_NO_JOINT && !hasRoot[above];
@@ -273,51 +273,51 @@ class RigPacker {
     std::uint64_t driven = 0;
     for (const Driver& driver : drivers_) driven += driver.weightCount;
     if (driven < rig_.drivenWeights) {
-      return invalid("of " + std::to_string(rig_.drivenWeights) + " driven weights drivers drive " +
-                     std::to_string(driven));
+      return badRig("of " + std::to_string(rig_.drivenWeights) + " driven weights drivers drive " +
+                    std::to_string(driven));
     }
     for (std::size_t i = 0; i < drivers_.size(); ++i) {
       const Driver& driver = drivers_[i];
       for (const std::uint32_t joint : driver.reads) {
         if (joint >= rig_.joints.size()) {
-          return invalid(driver.title() + ": joint " + std::to_string(joint) + " does not exist");
+          return badRig(driver.title() + ": joint " + std::to_string(joint) + " does not exist");
         }
       }
       for (const std::uint32_t joint : driver.drives) {
         if (joint >= rig_.joints.size())
-          return invalid(driver.title() + ": joint " + std::to_string(joint) + " does not exist");
+          return badRig(driver.title() + ": joint " + std::to_string(joint) + " does not exist");
         if (joint < written) {
-          return invalid(driver.title() + " drives joint " + std::to_string(joint) +
-                         ", which is written");
+          return badRig(driver.title() + " drives joint " + std::to_string(joint) +
+                        ", which is written");
         }
         if (std::exchange(jointDrivers_[joint - written], i) != none)
-          return invalid("two drivers drive joint " + std::to_string(joint));
+          return badRig("two drivers drive joint " + std::to_string(joint));
       }
       const std::uint64_t first = driver.firstWeight, count = driver.weightCount;
       const std::uint64_t end = std::uint64_t{rig_.givenWeights} + rig_.drivenWeights;
       if (count != 0 && (first < rig_.givenWeights || first + count > end)) {
-        return invalid(driver.title() + " drives weights " + std::to_string(first) + " to " +
-                       std::to_string(first + count - 1) + ", but driven ones are " +
-                       std::to_string(rig_.givenWeights) + " to " + std::to_string(end - 1));
+        return badRig(driver.title() + " drives weights " + std::to_string(first) + " to " +
+                      std::to_string(first + count - 1) + ", but driven ones are " +
+                      std::to_string(rig_.givenWeights) + " to " + std::to_string(end - 1));
       }
       if (count != 0) weightRanges_.push_back({first, first + count, i});
       for (const std::uint32_t weight : driver.readsWeights) {
         if (weight >= end)
-          return invalid(driver.title() + ": weight " + std::to_string(weight) + " does not exist");
+          return badRig(driver.title() + ": weight " + std::to_string(weight) + " does not exist");
       }
     }
     std::ranges::sort(weightRanges_, {}, &WeightRange::first);
     std::uint64_t next = rig_.givenWeights;
     for (const WeightRange& range : weightRanges_) {
       if (range.first != next) {
-        return invalid("weight " + std::to_string(std::min(range.first, next)) +
-                       (range.first < next ? " has two drivers" : " has no driver"));
+        return badRig("weight " + std::to_string(std::min(range.first, next)) +
+                      (range.first < next ? " has two drivers" : " has no driver"));
       }
       next = range.end;
     }
     if (const auto lost = std::ranges::find(jointDrivers_, none); lost != jointDrivers_.end()) {
       const auto joint = static_cast<std::size_t>(lost - jointDrivers_.begin()) + written;
-      return invalid("joint " + std::to_string(joint) + " is not written, and no driver drives it");
+      return badRig("joint " + std::to_string(joint) + " is not written, and no driver drives it");
     }
     return {};
   }
@@ -363,8 +363,8 @@ class RigPacker {
     }
     if (order_.size() == drivers_.size()) return {};
     const auto stuck = std::ranges::find_if(waitsFor, [](std::size_t count) { return count != 0; });
-    return invalid(drivers_[static_cast<std::size_t>(stuck - waitsFor.begin())].title() +
-                   " is part of, or reads, a cycle of drivers");
+    return badRig(drivers_[static_cast<std::size_t>(stuck - waitsFor.begin())].title() +
+                  " is part of, or reads, a cycle of drivers");
   }
 
   Result<RigDriver> write(const Driver& driver) {
@@ -385,8 +385,8 @@ class RigPacker {
   Result<Matrix> invertBind(std::uint32_t joint, const std::string& title) const {
     if (const std::optional<Matrix> inverse = inverseOf(matrixFrom(rig_.joints[joint].bind)))
       return Matrix(*inverse);
-    return invalid(title + ": the bind matrix of joint " + std::to_string(joint) +
-                   " has no inverse");
+    return badRig(title + ": the bind matrix of joint " + std::to_string(joint) +
+                  " has no inverse");
   }
 
   struct Sensor {
@@ -422,8 +422,8 @@ class RigPacker {
   Result<RigDriver> writeTwist(const TwistDriver& view, const std::string& title) {
     const Vec3 axis(double{view.axis[0]}, double{view.axis[1]}, double{view.axis[2]});
     if (!areFinite(view.axis) || !(math::length(axis) > 0))
-      return invalid(title + ": the axis has no direction");
-    if (!(std::abs(view.share) <= 1)) return invalid(title + ": the share is not from -1 to 1");
+      return badRig(title + ": the axis has no direction");
+    if (!(std::abs(view.share) <= 1)) return badRig(title + ": the share is not from -1 to 1");
     const Result<Sensor> sensor = sensorOf(view.source, title);
     if (!sensor) return sensor.error();
     RigTwist twist{};
@@ -470,11 +470,11 @@ class RigPacker {
 Result<void> RigPacker::checkCorrective(const CorrectiveDriver& view,
                                         const std::string& title) const {
   const std::size_t inputs = view.inputs.size();
-  if (inputs == 0) return invalid(title + " has no input");
+  if (inputs == 0) return badRig(title + " has no input");
   const std::size_t examples = view.examples.size() / inputs;
   if (examples == 0 || examples * inputs != view.examples.size()) {
-    return invalid(title + " has " + std::to_string(view.examples.size()) +
-                   " rotations for examples of " + std::to_string(inputs) + " inputs");
+    return badRig(title + " has " + std::to_string(view.examples.size()) +
+                  " rotations for examples of " + std::to_string(inputs) + " inputs");
   }
   if (examples > maxRigExamples) {
     return Error{ErrorCode::limitExceeded,
@@ -482,28 +482,28 @@ Result<void> RigPacker::checkCorrective(const CorrectiveDriver& view,
                      " examples; the maximum is " + std::to_string(maxRigExamples)};
   }
   if (!(view.radius >= 0) || !std::isfinite(view.radius))
-    return invalid(title + ": the radius is negative or not finite");
+    return badRig(title + ": the radius is negative or not finite");
   if (view.radius > 0 &&
       !std::isnormal(static_cast<float>(-0.5 / (double{view.radius} * view.radius))))
-    return invalid(title + ": the radius is too small or too large for float32");
+    return badRig(title + ": the radius is too small or too large for float32");
   if (view.weights.size() != std::uint64_t{examples} * view.weightCount ||
       view.offsets.size() != examples * view.joints.size()) {
-    return invalid(title + " has " + std::to_string(view.weights.size()) + " weights and " +
-                   std::to_string(view.offsets.size()) + " offsets for " +
-                   std::to_string(examples) + " examples of " + std::to_string(view.weightCount) +
-                   " weights and " + std::to_string(view.joints.size()) + " joints");
+    return badRig(title + " has " + std::to_string(view.weights.size()) + " weights and " +
+                  std::to_string(view.offsets.size()) + " offsets for " + std::to_string(examples) +
+                  " examples of " + std::to_string(view.weightCount) + " weights and " +
+                  std::to_string(view.joints.size()) + " joints");
   }
-  if (view.weightCount == 0 && view.joints.empty()) return invalid(title + " drives nothing");
+  if (view.weightCount == 0 && view.joints.empty()) return badRig(title + " drives nothing");
   const auto isRotation = [](const std::array<float, 4>& q) {
     return areFinite(q) && std::ranges::any_of(q, [](float number) { return number != 0; });
   };
   if (!std::ranges::all_of(view.examples, isRotation))
-    return invalid(title + ": a rotation of an example is 0 or not finite");
+    return badRig(title + ": a rotation of an example is 0 or not finite");
   if (!std::ranges::all_of(view.weights, [](float weight) { return std::isfinite(weight); }))
-    return invalid(title + ": a weight of an example is not finite");
+    return badRig(title + ": a weight of an example is not finite");
   for (const JointOffset& offset : view.offsets) {
     if (!areFinite(offset.translation) || !areFinite(offset.scale) || !isRotation(offset.rotation))
-      return invalid(title + ": an offset of an example is not finite, or its rotation is 0");
+      return badRig(title + ": an offset of an example is not finite, or its rotation is 0");
   }
   return {};
 }
@@ -555,7 +555,7 @@ Result<RigDriver> RigPacker::writeCorrective(const CorrectiveDriver& view,
   }
   const SymmetricSolver solver(matrix, examples);
   const auto areSimilar = [&] {
-    return invalid(title + ": two examples are the same, or too near each other for its radius");
+    return badRig(title + ": two examples are the same, or too near each other for its radius");
   };
   if (solver.isSingular()) return areSimilar();
   // The coefficients for the values of one number in all examples; empty if they miss them.
@@ -669,7 +669,7 @@ Result<RigDriver> RigPacker::writeChain(const ChainDriver& chain, const std::str
     dermis::put(joint.point, curve->point(place));
     const Vec3 direction = curve->slope(place);
     if (!(math::length(direction) > 1e-6 * length))
-      return invalid(title + ": the curve stands still between two joints");
+      return badRig(title + ": the curve stands still between two joints");
     dermis::put(joint.direction, direction / math::length(direction));
     RigNode& node = records[place.piece];
     if (node.jointCount++ == 0) node.joints = static_cast<std::uint32_t>(words_.size());
@@ -681,11 +681,11 @@ Result<RigDriver> RigPacker::writeChain(const ChainDriver& chain, const std::str
 
 Result<RigDriver> RigPacker::writeLinear(const LinearDriver& view, const std::string& title) {
   if (view.weights.size() != view.matrices.size()) {
-    return invalid(title + " has " + std::to_string(view.weights.size()) + " weights, but " +
-                   std::to_string(view.matrices.size()) + " matrices");
+    return badRig(title + " has " + std::to_string(view.weights.size()) + " weights, but " +
+                  std::to_string(view.matrices.size()) + " matrices");
   }
   if (!std::ranges::all_of(view.matrices, isFinite))
-    return invalid(title + ": a matrix has a number that is not finite");
+    return badRig(title + ": a matrix has a number that is not finite");
   const auto data = static_cast<std::uint32_t>(words_.size());
   append(RigLinear{placeOf(view.joint), rig_.joints[view.joint].parent, {}});
   for (std::size_t i = 0; i < view.weights.size(); ++i) {
@@ -704,7 +704,7 @@ Result<PackedRig> packRig(const RigView& rig) {
   Result<std::vector<std::uint32_t>> words = RigPacker(rig).run();
   if (!words) return words.error();
   if (!checkRig(*words))
-    return invalid("a bind matrix, or what follows from it, is too large for float32");
+    return badRig("a bind matrix, or what follows from it, is too large for float32");
   PackedRig packed;
   packed.words_ = std::move(*words);
   return packed;
