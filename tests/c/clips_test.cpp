@@ -288,7 +288,7 @@ TEST_F(CClipsTest, FiguresPlay) {
   dermis_clips clipsOfScene{};
   expectOk(dermis_add_clips(scene, bank, &clipsOfScene, &error));
   std::array<dermis_figure, 3> figures{};
-  expectOk(dermis_add_figures(scene, clipsOfScene, 3, figures.data(), &error));
+  expectOk(dermis_add_figures(scene, clipsOfScene, nullptr, 0, 3, figures.data(), &error));
 
   dermis_primitive primitive = sized<dermis_primitive>();
   expectOk(dermis_model_primitive(model, 0, &primitive, &error));
@@ -351,7 +351,44 @@ TEST_F(CClipsTest, FiguresPlay) {
   for (const dermis_figure figure : figures) expectOk(dermis_remove_figure(scene, figure, &error));
   expectError(dermis_remove_figure(scene, figures[0], &error), "it was removed");
   expectOk(dermis_remove_clips(scene, clipsOfScene, &error));
-  expectError(dermis_add_figures(scene, clipsOfScene, 2, figures.data(), &error), "it was removed");
+  expectError(dermis_add_figures(scene, clipsOfScene, nullptr, 0, 2, figures.data(), &error),
+              "it was removed");
+}
+
+TEST_F(CClipsTest, FiguresHaveRigs) {
+  Owned<dermis_bank> bank;
+  const std::uint32_t joints = pack(bank).jointCount(0);
+  Owned<dermis_runner> runner;
+  expectOk(dermis_runner_create(nullptr, &runner, &error));
+  dermis_scene* const scene = dermis_runner_scene(runner);
+  dermis_clips clipsOfScene{};
+  expectOk(dermis_add_clips(scene, bank, &clipsOfScene, &error));
+  std::array<dermis_rig, 2> rigs{};  // the second does not fit
+  const std::vector<dermis_rig_joint> rigJoints(joints);
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    dermis_rig_source described = sized<dermis_rig_source>();
+    described.joint_count = described.written_joints = joints - i;
+    described.joints = rigJoints.data();
+    Owned<dermis_packed_rig> packed;
+    expectOk(dermis_pack_rig(&described, &packed, &error));
+    expectOk(dermis_add_rig(scene, packed, &rigs[i], &error));
+  }
+  std::array<dermis_figure, 2> figures{};
+  const auto refused = [&](const std::string& part, const dermis_rig* all, std::uint32_t count) {
+    expectError(dermis_add_figures(scene, clipsOfScene, all, count, 2, figures.data(), &error),
+                part);
+    EXPECT_EQ(figures[0].generation, 0u);
+  };
+  refused("rigs is null", nullptr, 1);
+  refused("there are 2 rigs for 1 skins", rigs.data(), 2);
+  refused("has " + std::to_string(joints - 1) + " written joints", &rigs[1], 1);
+  dermis_rig misused{};
+  std::memcpy(&misused, &clipsOfScene, sizeof(misused));
+  refused("rig: this is the handle of clips", &misused, 1);
+  expectOk(dermis_add_figures(scene, clipsOfScene, rigs.data(), 1, 2, figures.data(), &error));
+  expectError(dermis_remove_rig(scene, rigs[0], &error), "is used by 2 poses");
+  expectOk(dermis_remove_rig(scene, rigs[1], &error));
+  refused("rig 1: it was removed", &rigs[1], 1);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "dermis/gltf.h"
 #include "dermis/scene.h"
 #include "dermis/vulkan/context.h"
+#include "rigged.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -658,6 +659,161 @@ TEST(CCommandsTest, AreThoseOfCpp) {
   EXPECT_GT(any, count);
   dermis_pipeline_info info = sized<dermis_pipeline_info>();
   expectError(dermis_describe_pipeline(~std::uint64_t{0}, &info, &error), "");
+}
+
+TEST(CCommandsTest, RigsAreThoseOfCpp) {
+  Buffers buffers, sameBuffers;
+  const dermis_limits limits = smallLimits();
+  dermis_commands_desc desc = sized<dermis_commands_desc>();
+  desc.limits = &limits;
+  desc.user = &buffers;
+  desc.create_buffer = Buffers::create;
+  desc.release_buffer = Buffers::release;
+  Owned<dermis_commands> commands;
+  expectOk(dermis_commands_create(&desc, &commands, &error));
+  dermis_scene* const scene = dermis_commands_scene(commands);
+  SceneCommandsDescription description;
+  description.limits = smallLimitsOfCpp();
+  description.memory = {
+      &sameBuffers,
+      [](void* user, const SceneBuffer& buffer) -> Result<void*> {
+        auto& memory = static_cast<Buffers*>(user)->buffers[buffer.number];
+        memory.resize(buffer.requirement.size);
+        return buffer.isMapped ? memory.data() : nullptr;
+      },
+      [](void* user, std::uint32_t number) { static_cast<Buffers*>(user)->buffers.erase(number); }};
+  SceneCommands same = must(SceneCommands::create(description));
+
+  const PackedRig packedSame = riggedPose();
+  Owned<dermis_packed_rig> packedRig;
+  expectOk(dermis_packed_rig_load(packedSame.bytes().data(), packedSame.bytes().size(), &packedRig,
+                                  &error));
+  dermis_rig rig{};
+  expectOk(dermis_add_rig(scene, packedRig, &rig, &error));
+  const RigHandle sameRig = must(same.scene().addRig(packedSame));
+  CMesh source(1, vertices, riggedJoints + drivenJoints);
+  Owned<dermis_packed> packed;
+  expectOk(dermis_pack(&source.view, source.jointCount, &packed, &error));
+  dermis_instance_desc figure = sized<dermis_instance_desc>();
+  expectOk(dermis_add_mesh(scene, packed, &figure.mesh, &error));
+  InstanceDescription instance;
+  instance.mesh = must(same.scene().addMesh(must(pack(source.mesh.view(), source.jointCount))));
+  std::array<dermis_pose, 3> poses{};  // the CPU, the GPU; the last without a rig
+  std::array<PoseHandle, 3> samePoses;
+  std::array<dermis_instance, 3> instances{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    dermis_pose_desc poseDesc = sized<dermis_pose_desc>();
+    poseDesc.joint_count = i == 2 ? source.jointCount : riggedJoints;
+    poseDesc.written_by_gpu = i == 1 ? 1 : 0;
+    if (i != 2) poseDesc.rig = rig;
+    expectOk(dermis_add_poses(scene, &poseDesc, 1, &poses[i], &error));
+    PoseOptions options;
+    options.writtenByGpu = i == 1;
+    if (i != 2) options.rig = sameRig;
+    samePoses[i] = must(same.scene().addPose(poseDesc.joint_count, options));
+    figure.pose = poses[i];
+    instance.pose = samePoses[i];
+    figure.driven_targets = instance.drivenTargets = 2;
+    figure.first_driven_weight = instance.firstDrivenWeight = 3;
+    expectOk(dermis_add_instance(scene, &figure, &instances[i], &error));
+    must(same.scene().addInstance(instance));
+  }
+  dermis_part part{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    expectOk(dermis_commands_driven_part(commands, poses[i], &part, &error));
+    expectPart(part, must(same.drivenPart(samePoses[i])));
+  }
+  expectOk(dermis_commands_pose_part(commands, poses[1], &part, &error));
+  expectPart(part, must(same.posePart(samePoses[1])));
+  expectOk(dermis_begin_frame(scene, 1, 0, &error));
+  must(same.scene().beginFrame(1, 0));
+  float* memory[2] = {};
+  std::uint32_t counts[2] = {9, 9};
+  const dermis_pose written[2] = {poses[0], poses[2]};
+  expectOk(dermis_write_pose_weights(scene, written, 2, memory, counts, &error));
+  EXPECT_EQ(counts[0], givenWeights);
+  EXPECT_EQ(counts[1], 0u);
+  const std::span<float> sameMemory = must(same.scene().writePoseWeights(samePoses[0]));
+  must(same.scene().writePoseWeights(samePoses[2]));
+  dermis_joint* joints = nullptr;
+  expectOk(dermis_write_poses(scene, poses.data(), 1, &joints, counts, &error));
+  EXPECT_EQ(counts[0], riggedJoints);
+  EXPECT_EQ(reinterpret_cast<float*>(joints + riggedJoints), memory[0]);
+  const std::span<JointMatrix> sameJoints = must(same.scene().writePose(samePoses[0]));
+  const Pose matrices = systemPose(7);
+  ASSERT_EQ(matrices.size(), sameJoints.size());
+  std::ranges::copy(matrices, sameJoints.begin());
+  std::memcpy(joints, matrices.data(), sameJoints.size_bytes());
+  for (std::size_t i = 0; i < givenWeights; ++i) memory[0][i] = sameMemory[i] = 0.25f;
+  expectOk(dermis_mark_written(scene, &poses[1], 1, &error));
+  must(same.scene().markWritten({&samePoses[1], 1}));
+  const dermis_command* list = nullptr;
+  std::uint32_t count = 0;
+  expectOk(dermis_commands_plan(commands, &list, &count, &error));
+  expectCommands({list, count}, must(same.plan()));
+  EXPECT_EQ(buffers.buffers, sameBuffers.buffers);
+
+  // The pipelines of such instances, with and without a scene.
+  const auto expectPipelines = [&](const dermis_scene* of, const PipelineNeeds& needs) {
+    std::vector<std::uint64_t> ids(200);
+    expectOk(dermis_list_pipelines(of, &figure, &limits, nullptr, ids.data(), 200, &count, &error));
+    const auto expected = must(pipelines(needs, description.limits, {}));
+    ASSERT_EQ(count, expected.size());
+    for (std::uint32_t i = 0; i < count; ++i)
+      EXPECT_EQ(ids[i], static_cast<std::uint64_t>(expected[i]));
+  };
+  figure.pose = poses[0];
+  instance.pose = samePoses[0];
+  expectPipelines(scene, must(same.scene().pipelineNeeds(instance)));
+  expectPipelines(nullptr, {.morphsOnGpu = true, .rigs = true});
+  figure.driven_targets = 0;
+  expectPipelines(nullptr, {});
+
+  // What is wrong is said.
+  expectError(dermis_add_rig(scene, nullptr, &rig, &error), "packed is null");
+  expectError(dermis_add_rig(scene, packedRig, nullptr, &error), "rig is null");
+  expectError(dermis_add_rig(nullptr, packedRig, &rig, &error), "scene is null");
+  expectError(dermis_remove_rig(scene, rig, &error), "is used by 2 poses");
+  expectError(dermis_remove_rig(nullptr, rig, &error), "scene is null");
+  dermis_rig misused{};
+  std::memcpy(&misused, &figure.mesh, sizeof(misused));
+  expectError(dermis_remove_rig(scene, misused, &error), "rig: this is the handle of a mesh");
+  dermis_mesh mesh{};
+  std::memcpy(&mesh, &rig, sizeof(mesh));
+  expectError(dermis_remove_mesh(scene, mesh, &error), "this is the handle of a rig");
+  dermis_pose_desc wrong = sized<dermis_pose_desc>();
+  wrong.joint_count = riggedJoints + 1;
+  wrong.rig = rig;
+  dermis_pose none{};
+  expectError(dermis_add_poses(scene, &wrong, 1, &none, &error), "written ones");
+  wrong.rig = misused;
+  expectError(dermis_add_poses(scene, &wrong, 1, &none, &error), "the handle of a mesh");
+  figure.driven_targets = 4;
+  dermis_instance more{};
+  expectError(dermis_add_instance(scene, &figure, &more, &error), "has 4 driven targets");
+  figure.driven_targets = 3;
+  figure.first_driven_weight = 5;
+  expectError(dermis_add_instance(scene, &figure, &more, &error), "from weight 5 on");
+  expectError(dermis_commands_driven_part(commands, poses[2], &part, &error), "has no rig");
+  expectError(dermis_commands_driven_part(commands, poses[0], nullptr, &error), "part is null");
+  expectError(dermis_commands_driven_part(nullptr, poses[0], &part, &error), "commands is null");
+  expectError(dermis_write_pose_weights(scene, nullptr, 1, memory, nullptr, &error),
+              "poses is null");
+  expectError(dermis_write_pose_weights(scene, written, 1, nullptr, nullptr, &error),
+              "weights is null");
+  expectError(dermis_write_pose_weights(nullptr, written, 1, memory, nullptr, &error),
+              "scene is null");
+  counts[0] = 9;
+  expectError(dermis_write_pose_weights(scene, &poses[1], 1, memory, counts, &error),
+              "written by the GPU");
+  EXPECT_EQ(memory[0], nullptr);
+  EXPECT_EQ(counts[0], 0u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    expectOk(dermis_remove_instance(scene, instances[i], &error));
+    expectOk(dermis_remove_pose(scene, poses[i], &error));
+  }
+  expectOk(dermis_remove_rig(scene, rig, &error));
+  expectError(dermis_remove_rig(scene, rig, &error), "it was removed");
 }
 
 TEST(CCommandsTest, AnErrorOfTheEngineIsThatOfTheFunction) {

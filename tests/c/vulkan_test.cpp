@@ -9,6 +9,7 @@
 
 #include "c_helpers.h"
 #include "mock_batch.h"
+#include "rigged.h"
 
 namespace dermis::test {
 namespace {
@@ -259,6 +260,19 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
     expectOk(dermis_add_instance(scene, &figure, &instance, &error));
     expectOk(dermis_weights_range(recorder, instance, &range, &error));
     EXPECT_EQ(range.byte_count, source.targets.size() * sizeof(float));
+    const PackedRig rigOfCpp = riggedPose();
+    Owned<dermis_packed_rig> packedRig;
+    expectOk(dermis_packed_rig_load(rigOfCpp.bytes().data(), rigOfCpp.bytes().size(), &packedRig,
+                                    &error));
+    expectOk(dermis_add_rig(scene, packedRig, &poseDesc.rig, &error));
+    dermis_pose rigged{};
+    expectOk(dermis_add_poses(scene, &poseDesc, 1, &rigged, &error));
+    expectOk(dermis_driven_range(recorder, rigged, &range, &error));
+    EXPECT_EQ(range.byte_count,
+              drivenJoints * sizeof(dermis_joint) + (givenWeights + drivenWeights) * sizeof(float));
+    expectError(dermis_driven_range(recorder, figure.pose, &range, &error), "has no rig");
+    expectError(dermis_driven_range(recorder, rigged, nullptr, &error), "range is null");
+    expectError(dermis_driven_range(nullptr, rigged, &range, &error), "recorder is null");
     expectOk(dermis_begin_frame(scene, 1, 0, &error));
     expectOk(dermis_mark_written(scene, &figure.pose, 1, &error));
     expectOk(dermis_record(recorder, commandBuffer, VK_NULL_HANDLE, 0, &error));

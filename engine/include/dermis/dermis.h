@@ -1,7 +1,7 @@
 // The C interface of Dermis: the library `dermis` has core, the CPU path, the Vulkan back end and,
 // if it was built with it, glTF import. C99. What a function, a method or a format means is
-// described in more detail in the C++ header that has it: mesh.h, layout.h, clips.h, plan.h,
-// scene.h, cpu.h, gltf.h, vulkan/context.h, vulkan/scene_recorder.h.
+// described in more detail in the C++ header that has it: mesh.h, layout.h, clips.h, rig.h,
+// plan.h, scene.h, cpu.h, gltf.h, vulkan/context.h, vulkan/scene_recorder.h.
 //
 // Rules, once:
 //
@@ -17,9 +17,8 @@
 //   function returns belong to the object; the function says how long they are valid.
 // - `dermis_destroy` destroys every object that a function creates. Using a destroyed object is
 //   undefined. Using the handle of something that was removed is an error.
-// - One thread at a time may use an object. A context, a mesh, a bank and a model may be used by
-// any
-//   number of threads. So may a plan, unless `dermis_make_plan` fills it.
+// - One thread at a time may use an object. A context, a mesh, a bank, a packed rig and a model may
+//   be used by any number of threads. So may a plan, unless `dermis_make_plan` fills it.
 // - Callbacks get their `user` pointer first, and must not throw or longjmp. If one that creates
 //   something fails, the function that needs it fails with its code and error; a code that is not
 //   from `DERMIS_INVALID_ARGUMENT` to `DERMIS_IO_ERROR` counts as `DERMIS_VULKAN_ERROR`.
@@ -87,8 +86,8 @@ enum { DERMIS_HEADER_VERSION = 100 };
 DERMIS_C_API uint32_t dermis_version(void);
 
 // Destroys a dermis_context, dermis_recorder, dermis_runner, dermis_commands, dermis_packed,
-// dermis_repaired, dermis_model, dermis_plan or dermis_bindings. Null is ignored. A scene belongs
-// to its recorder, runner or commands, and is not destroyed.
+// dermis_repaired, dermis_bank, dermis_packed_rig, dermis_model, dermis_plan or dermis_bindings.
+// Null is ignored. A scene belongs to its recorder, runner or commands, and is not destroyed.
 DERMIS_C_API void dermis_destroy(void* object);
 
 // ---- Plain data.
@@ -115,6 +114,10 @@ typedef struct dermis_clips {
 typedef struct dermis_figure {
   uint32_t kind, index, generation;
 } dermis_figure;
+// A rig that a scene has.
+typedef struct dermis_rig {
+  uint32_t kind, index, generation;
+} dermis_rig;
 
 // A joint matrix: joint global transform × inverse bind matrix. An affine transform as a row-major
 // 3×4 matrix, m[row][column]; column 3 is the translation. Skinned vertices are in the space of the
@@ -425,9 +428,10 @@ DERMIS_C_API dermis_code dermis_remove_mesh(dermis_scene* scene, dermis_mesh mes
 // What is fixed when a pose is added.
 typedef struct dermis_pose_desc {
   uint32_t size;
-  uint32_t joint_count;     // required: 1 to 65536
+  uint32_t joint_count;     // required: 1 to 65536; with a rig, that of its written joints
   uint32_t written_by_gpu;  // 0: the CPU writes it, where `dermis_write_poses` says
-  dermis_promise promise;
+  dermis_promise promise;   // includes joints that a rig drives
+  dermis_rig rig;           // computes the joints after the written ones; all zeros: none
 } dermis_pose_desc;
 // Adds `count` poses of the same description, all of identities until they are written. If it
 // fails, it adds none.
@@ -465,8 +469,12 @@ typedef struct dermis_instance_desc {
   uint32_t interpolates;
   dermis_morph_writer morph_writer;  // other than the CPU needs a mesh with morph targets
   // With `DERMIS_MORPH_WRITER_CLIPS`: the node of the skeleton whose weights drive the instance,
-  // with as many as the mesh has targets.
+  // with as many as the mesh has targets that no rig drives.
   uint32_t weights_of;
+  // The number of the mesh's last morph targets whose weights are those of the rig of the pose,
+  // consecutive from `first_driven_weight` on. Without a rig they are not active.
+  uint32_t driven_targets;
+  uint32_t first_driven_weight;
 } dermis_instance_desc;
 // Adds an instance. The next frame that is executed skins it.
 DERMIS_C_API dermis_code dermis_add_instance(dermis_scene* scene, const dermis_instance_desc* desc,
@@ -811,8 +819,9 @@ DERMIS_C_API dermis_code dermis_write_tables(const dermis_plan* plan, void* byte
 
 // Lists the pipelines that instances like this one can need, at most `capacity`, which may be 0;
 // `count` gets how many there are. Limits and tuning are those of the commands. With a scene and
-// valid handles, only for the same kind of mesh and pose; without
-// (`scene` may be null), for any. For an engine with its own RHI; others call `dermis_prepare`.
+// valid handles, only for the same kind of mesh and pose; with null handles, for any; without a
+// scene (`scene` may be null) for any, but poses of figures, and those with rigs unless
+// `driven_targets` is not 0. For an engine with its own RHI; others call `dermis_prepare`.
 DERMIS_C_API dermis_code dermis_list_pipelines(const dermis_scene* scene,
                                                const dermis_instance_desc* desc,
                                                const dermis_limits* limits,
@@ -890,15 +899,20 @@ DERMIS_C_API dermis_code dermis_commands_read_back(dermis_commands* commands, ui
                                                    const void* bytes, size_t byte_count,
                                                    dermis_error* error);
 // Where the joint matrices of a pose are that a GPU pass of the engine writes, or that belongs to a
-// figure.
+// figure. Behind those that the engine writes are the given weights of its rig.
 DERMIS_C_API dermis_code dermis_commands_pose_part(const dermis_commands* commands,
                                                    dermis_pose pose, dermis_part* part,
                                                    dermis_error* error);
 // Where the morph weights of an instance are that a GPU pass of the engine writes: a float for each
-// target of its mesh.
+// target of its mesh that no rig drives.
 DERMIS_C_API dermis_code dermis_commands_weights_part(const dermis_commands* commands,
                                                       dermis_instance instance, dermis_part* part,
                                                       dermis_error* error);
+// Where the joints are that the rig of a pose drives, and behind them all its weights, a float
+// each.
+DERMIS_C_API dermis_code dermis_commands_driven_part(const dermis_commands* commands,
+                                                     dermis_pose pose, dermis_part* part,
+                                                     dermis_error* error);
 
 // How a buffer is used before or after Dermis. Combine uses by |.
 typedef enum dermis_use {
@@ -1141,9 +1155,12 @@ DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank
 // Fails if a figure uses it.
 DERMIS_C_API dermis_code dermis_remove_clips(dermis_scene* scene, dermis_clips clips,
                                              dermis_error* error);
-// Adds figures, which rest until they play. If it fails, it adds none.
-DERMIS_C_API dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips, uint32_t count,
-                                            dermis_figure* figures, dermis_error* error);
+// Adds figures, which rest until they play. `rigs` are those of their poses, one or zeros for each
+// skin of the bank; `rig_count` may be 0. If it fails, it adds none.
+DERMIS_C_API dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips,
+                                            const dermis_rig* rigs, uint32_t rig_count,
+                                            uint32_t count, dermis_figure* figures,
+                                            dermis_error* error);
 // Removes a figure and its poses. Fails if an instance uses one of them.
 DERMIS_C_API dermis_code dermis_remove_figure(dermis_scene* scene, dermis_figure figure,
                                               dermis_error* error);
@@ -1161,6 +1178,127 @@ typedef struct dermis_play {
 // "entry " and the index of the first that is wrong.
 DERMIS_C_API dermis_code dermis_play_clips(dermis_scene* scene, const dermis_play* plays,
                                            uint32_t count, dermis_error* error);
+
+// ---- Rigs (rig.h): joints and morph weights that follow from the joints of a pose, computed by
+// the scene or by `dermis_evaluate_rig`. First come the written joints, then those that drivers
+// compute; meshes number them in this order. In the same way, first come the weights that are given
+// with a pose, then those that correctives compute.
+
+// A joint of a rig.
+typedef struct dermis_rig_joint {
+  uint32_t parent;    // 1 + its index; 0: none
+  dermis_joint bind;  // required: its global transform in bind pose
+} dermis_rig_joint;
+// A joint that takes a share of the twist of another one.
+typedef struct dermis_twist {
+  uint32_t size;
+  uint32_t joint;  // driven
+  uint32_t source;
+  float axis[3];  // required: in the axes of `source`, of any length
+  float share;    // from -1 to 1
+} dermis_twist;
+// How a driven joint is moved from its bind pose, in its own axes.
+typedef struct dermis_joint_offset {
+  float translation[3];
+  float rotation[4];  // a quaternion: x, y, z, w, of any length; 0 0 0 0 counts as 0 0 0 1
+  float scale[3];     // 0 0 0 counts as 1 1 1
+} dermis_joint_offset;
+// Weights and joint offsets that are given for example poses of some joints.
+typedef struct dermis_corrective {
+  uint32_t size;
+  uint32_t input_count, example_count;  // required; at most 64 examples
+  uint32_t first_weight, weight_count;  // that it drives
+  uint32_t joint_count;
+  const uint32_t* inputs;  // joints
+  // For each example, for each input: its rotation relative to its parent and to the bind pose, a
+  // quaternion x, y, z, w of any length.
+  const float* rotations;
+  const float* weights;                // for each example: `weight_count` of them
+  const uint32_t* joints;              // driven
+  const dermis_joint_offset* offsets;  // for each example: one for each of `joints`
+  float radius;                        // of Gaussian functions, about an angle; 0: linear ones
+} dermis_corrective;
+// Joints along a curve through a chain of joints, one at each end of a segment but the ends of the
+// chain.
+typedef struct dermis_chain {
+  uint32_t size;
+  uint32_t joint_count;    // required: at least 2
+  const uint32_t* joints;  // from one end to the other
+  uint32_t first_driven;   // of `segments` - 1 consecutive joints
+  uint32_t segments;       // required: at least 2
+} dermis_chain;
+// A joint whose matrix is that of its parent × (1 + the sum of weights × matrices).
+typedef struct dermis_linear {
+  uint32_t size;
+  uint32_t joint;           // driven
+  const uint32_t* weights;  // their numbers
+  const dermis_joint* matrices;
+  uint32_t count;  // of both
+} dermis_linear;
+// What a rig is made of. Drivers may be in any order.
+typedef struct dermis_rig_source {
+  uint32_t size;
+  uint32_t joint_count, written_joints;  // required
+  uint32_t given_weights, driven_weights;
+  uint32_t weights_of;  // for figures: the node whose morph weights are the given ones
+  const dermis_rig_joint* joints;
+  const dermis_twist* twists;
+  const dermis_corrective* correctives;
+  const dermis_chain* chains;
+  const dermis_linear* linears;
+  uint32_t twist_count, corrective_count, chain_count, linear_count;
+} dermis_rig_source;
+
+// A rig that a scene can have. It can be stored with the assets.
+typedef struct dermis_packed_rig dermis_packed_rig;
+// Packs a rig, at import. Refuses what `packRig` in rig.h does.
+DERMIS_C_API dermis_code dermis_pack_rig(const dermis_rig_source* source, dermis_packed_rig** rig,
+                                         dermis_error* error);
+// Makes a rig from stored bytes, which it copies and checks.
+DERMIS_C_API dermis_code dermis_packed_rig_load(const void* bytes, size_t byte_count,
+                                                dermis_packed_rig** rig, dermis_error* error);
+// What is known of a packed rig.
+typedef struct dermis_packed_rig_info {
+  uint32_t size;
+  uint32_t written_joints, driven_joints;
+  uint32_t given_weights, driven_weights;
+  uint32_t weights_of;  // 0xffffffff if there are no given weights
+  const void* bytes;    // the blob, valid as long as the rig
+  uint64_t byte_count;  // of the blob
+  uint32_t is_rigid;    // whether driven joints are rigid whenever the written ones are
+  float residual;       // by how much a corrective misses the values of an example at most
+} dermis_packed_rig_info;
+// Says what is known of a packed rig.
+DERMIS_C_API dermis_code dermis_packed_rig_contents(const dermis_packed_rig* rig,
+                                                    dermis_packed_rig_info* info,
+                                                    dermis_error* error);
+// Computes the driven joints and all weights, the given ones first. The counts must be those of the
+// rig.
+DERMIS_C_API dermis_code dermis_evaluate_rig(const dermis_packed_rig* rig,
+                                             const dermis_joint* written, uint32_t written_count,
+                                             const float* given_weights, uint32_t given_count,
+                                             dermis_joint* driven, uint32_t driven_count,
+                                             float* weights, uint32_t weight_count,
+                                             dermis_error* error);
+// Binds a mesh to a chain of a rig: what its joints move follows the two ends of the nearest
+// segment. `view` and `repaired` as for `dermis_repair`; it may be bound to another chain, and
+// packed for all joints of the rig.
+DERMIS_C_API dermis_code dermis_bend_chain(const dermis_mesh_view* mesh,
+                                           const dermis_rig_joint* joints, uint32_t joint_count,
+                                           const dermis_chain* chain, dermis_mesh_view* view,
+                                           dermis_repaired** repaired, dermis_error* error);
+
+// Adds a rig to a scene, which keeps its bytes: it may then be destroyed.
+DERMIS_C_API dermis_code dermis_add_rig(dermis_scene* scene, const dermis_packed_rig* packed,
+                                        dermis_rig* rig, dermis_error* error);
+// Fails if a pose has it.
+DERMIS_C_API dermis_code dermis_remove_rig(dermis_scene* scene, dermis_rig rig,
+                                           dermis_error* error);
+// `dermis_write_poses` for the given weights of poses: both return memory of the same poses, and
+// the engine writes both. `weight_counts` may be null; without a rig a count is 0.
+DERMIS_C_API dermis_code dermis_write_pose_weights(dermis_scene* scene, const dermis_pose* poses,
+                                                   uint32_t count, float** weights,
+                                                   uint32_t* weight_counts, dermis_error* error);
 
 // ---- Vulkan. Define DERMIS_VULKAN, or include vulkan_core.h before. No loader is linked.
 
@@ -1321,13 +1459,18 @@ typedef struct dermis_recorder_info {
 // Says where the output is, and what the last frame cost.
 DERMIS_C_API dermis_code dermis_recorder_contents(const dermis_recorder* recorder,
                                                   dermis_recorder_info* info, dermis_error* error);
-// Where a GPU pass of the engine writes the joint matrices of a pose.
+// Where a GPU pass of the engine writes the joint matrices of a pose, and behind them the given
+// weights of its rig.
 DERMIS_C_API dermis_code dermis_pose_range(const dermis_recorder* recorder, dermis_pose pose,
                                            dermis_range* range, dermis_error* error);
-// The same for the morph weights of an instance: a float for each target of its mesh.
+// The same for the morph weights of an instance: a float for each target of its mesh that no rig
+// drives.
 DERMIS_C_API dermis_code dermis_weights_range(const dermis_recorder* recorder,
                                               dermis_instance instance, dermis_range* range,
                                               dermis_error* error);
+// The same as `dermis_commands_driven_part`.
+DERMIS_C_API dermis_code dermis_driven_range(const dermis_recorder* recorder, dermis_pose pose,
+                                             dermis_range* range, dermis_error* error);
 
 #endif  // VULKAN_CORE_H_
 

@@ -265,15 +265,18 @@ dermis_code dermis_remove_clips(dermis_scene* scene, dermis_clips clips, dermis_
   return guarded(error, [&] { must(changedScene(scene).removeClips(handleOf(clips))); });
 }
 
-dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips, uint32_t count,
-                               dermis_figure* figures, dermis_error* error) {
+dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips, const dermis_rig* rigs,
+                               uint32_t rig_count, uint32_t count, dermis_figure* figures,
+                               dermis_error* error) {
   return guarded(error, [&] {
     Scene& target = changedScene(scene);
     const std::span<dermis_figure> results = array(figures, count, "figures");
     const ClipsHandle bank = handleOf(clips);
+    std::vector<RigHandle> ofSkins;
+    for (const dermis_rig& rig : array(rigs, rig_count, "rigs")) ofSkins.push_back(handleOf(rig));
     std::vector<FigureHandle> added;
     while (added.size() < count) {
-      const Result<FigureHandle> figure = target.addFigure(bank);
+      const Result<FigureHandle> figure = target.addFigure(bank, ofSkins);
       if (!figure) {
         for (const FigureHandle other : added) must(target.removeFigure(other));
         must(figure);

@@ -236,4 +236,13 @@ dermis_code dermis_commands_weights_part(const dermis_commands* commands, dermis
   });
 }
 
+dermis_code dermis_commands_driven_part(const dermis_commands* commands, dermis_pose pose,
+                                        dermis_part* part, dermis_error* error) {
+  return guarded(error, [&] {
+    const dermis_commands& lender = required(commands, "commands");
+    dermis_part& result = required(part, "part");
+    result = partOf(must(lender.commands->drivenPart(handleOf(pose))));
+  });
+}
+
 }  // extern "C"

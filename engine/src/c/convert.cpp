@@ -118,8 +118,8 @@ std::span<const JointMatrix> jointsOf(const dermis_joint* joints, std::uint32_t 
 
 void checkKind(std::uint32_t kind, Kind wanted, const char* name) {
   if (kind == static_cast<std::uint32_t>(wanted)) return;
-  constexpr const char* kinds[] = {"nothing",     "a mesh", "a pose",
-                                   "an instance", "clips",  "a figure"};
+  constexpr const char* kinds[] = {"nothing", "a mesh",   "a pose", "an instance",
+                                   "clips",   "a figure", "a rig"};
   fail(std::string(name) + ": this is the handle of " +
        (kind < std::size(kinds) ? kinds[kind] : "nothing that Dermis made"));
 }
@@ -235,6 +235,8 @@ InstanceDescription instanceOf(const dermis_instance_desc& desc) {
   result.morphWriter = static_cast<MorphWriter>(
       enumerator(desc.morph_writer, DERMIS_MORPH_WRITER_CLIPS, "the morph writer"));
   result.weightsOf = desc.weights_of;
+  result.drivenTargets = desc.driven_targets;
+  result.firstDrivenWeight = desc.first_driven_weight;
   return result;
 }
 
@@ -246,7 +248,8 @@ PipelineNeeds needsOf(const dermis_scene* scene, const dermis_instance_desc* cal
   needs.layout = desc.layout;
   needs.bounds = desc.bounds;
   needs.culledOnGpu = desc.culledOnGpu;
-  needs.morphsOnGpu = desc.morphWriter != MorphWriter::cpu;
+  needs.rigs = desc.drivenTargets != 0;
+  needs.morphsOnGpu = desc.morphWriter != MorphWriter::cpu || needs.rigs;
   return needs;
 }
 

@@ -30,7 +30,14 @@ std::span<const JointMatrix> jointsOf(const dermis_joint* joints, std::uint32_t 
                                       const char* name);
 
 /// The kinds of handles.
-enum class Kind : std::uint32_t { mesh = 1, pose = 2, instance = 3, clips = 4, figure = 5 };
+enum class Kind : std::uint32_t {
+  mesh = 1,
+  pose = 2,
+  instance = 3,
+  clips = 4,
+  figure = 5,
+  rig = 6
+};
 constexpr Kind kindOf(const dermis_mesh&) {
   return Kind::mesh;
 }
@@ -45,6 +52,9 @@ constexpr Kind kindOf(const dermis_clips&) {
 }
 constexpr Kind kindOf(const dermis_figure&) {
   return Kind::figure;
+}
+constexpr Kind kindOf(const dermis_rig&) {
+  return Kind::rig;
 }
 void checkKind(std::uint32_t kind, Kind wanted, const char* name);
 
@@ -69,6 +79,9 @@ inline ClipsHandle handleOf(const dermis_clips& clips) {
 }
 inline FigureHandle handleOf(const dermis_figure& figure) {
   return handleOf<FigureHandle>(figure, "figure");
+}
+inline RigHandle handleOf(const dermis_rig& rig) {
+  return handleOf<RigHandle>(rig, "rig");
 }
 template <typename CHandle, typename CppHandle>
 CHandle handleTo(const CppHandle& handle) {
@@ -139,6 +152,13 @@ struct dermis_packed : dermis::c::Object {
   explicit dermis_packed(dermis::PackedMesh made) : mesh(std::move(made)) {}
 
   dermis::PackedMesh mesh;
+};
+
+struct dermis_repaired : dermis::c::Object {
+  explicit dermis_repaired(dermis::RepairedMesh made) : mesh(std::move(made)), view(mesh.view()) {}
+
+  dermis::RepairedMesh mesh;
+  dermis::c::ViewForCaller view;
 };
 
 struct dermis_plan : dermis::c::Object {

@@ -5,13 +5,6 @@
 
 #include "convert.h"
 
-struct dermis_repaired : dermis::c::Object {
-  explicit dermis_repaired(dermis::RepairedMesh made) : mesh(std::move(made)), view(mesh.view()) {}
-
-  dermis::RepairedMesh mesh;
-  dermis::c::ViewForCaller view;
-};
-
 using namespace dermis;
 using namespace dermis::c;
 

@@ -32,6 +32,20 @@ dermis_store storeOf(const StoreStatistics& store) {
   return {store.capacity, store.used, store.largestFree};
 }
 
+/// Gets memory of poses in this frame. From the one that fails on, pointers and counts are 0.
+template <typename Memory, typename Element>
+void getMemory(Scene& scene, Result<std::span<Memory>> (Scene::*write)(PoseHandle),
+               std::span<const dermis_pose> poses, std::span<Element*> results,
+               std::uint32_t* counts) {
+  std::ranges::fill(results, nullptr);
+  if (counts != nullptr) std::fill_n(counts, poses.size(), 0);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::span<Memory> memory = must((scene.*write)(handleOf(poses[i])));
+    results[i] = reinterpret_cast<Element*>(memory.data());
+    if (counts != nullptr) counts[i] = static_cast<std::uint32_t>(memory.size());
+  }
+}
+
 }  // namespace
 
 extern "C" {
@@ -58,7 +72,7 @@ dermis_code dermis_add_poses(dermis_scene* scene, const dermis_pose_desc* caller
     const std::span<dermis_pose> results = array(poses, count, "poses");
     std::vector<PoseHandle> added(count);
     must(target.addPoses(added, desc.joint_count,
-                         {desc.written_by_gpu != 0, promiseOf(desc.promise)}));
+                         {desc.written_by_gpu != 0, promiseOf(desc.promise), handleOf(desc.rig)}));
     for (std::size_t i = 0; i < added.size(); ++i) results[i] = handleTo<dermis_pose>(added[i]);
   });
 }
@@ -90,16 +104,17 @@ dermis_code dermis_begin_frame(dermis_scene* scene, uint64_t frame, uint64_t com
 dermis_code dermis_write_poses(dermis_scene* scene, const dermis_pose* poses, uint32_t count,
                                dermis_joint** joints, uint32_t* joint_counts, dermis_error* error) {
   return guarded(error, [&] {
-    Scene& target = changedScene(scene);
-    const std::span<const dermis_pose> handles = array(poses, count, "poses");
-    const std::span<dermis_joint*> results = array(joints, count, "joints");
-    std::ranges::fill(results, nullptr);
-    if (joint_counts != nullptr) std::fill_n(joint_counts, count, 0);
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const std::span<JointMatrix> memory = must(target.writePose(handleOf(handles[i])));
-      results[i] = reinterpret_cast<dermis_joint*>(memory.data());
-      if (joint_counts != nullptr) joint_counts[i] = static_cast<std::uint32_t>(memory.size());
-    }
+    getMemory(changedScene(scene), &Scene::writePose, array(poses, count, "poses"),
+              array(joints, count, "joints"), joint_counts);
+  });
+}
+
+dermis_code dermis_write_pose_weights(dermis_scene* scene, const dermis_pose* poses, uint32_t count,
+                                      float** weights, uint32_t* weight_counts,
+                                      dermis_error* error) {
+  return guarded(error, [&] {
+    getMemory(changedScene(scene), &Scene::writePoseWeights, array(poses, count, "poses"),
+              array(weights, count, "weights"), weight_counts);
   });
 }
 

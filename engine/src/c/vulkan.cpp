@@ -325,4 +325,14 @@ dermis_code dermis_weights_range(const dermis_recorder* recorder, dermis_instanc
   });
 }
 
+dermis_code dermis_driven_range(const dermis_recorder* recorder, dermis_pose pose,
+                                dermis_range* range, dermis_error* error) {
+  return guarded(error, [&] {
+    const vulkan::SceneRecorder& source = *required(recorder, "recorder").recorder;
+    dermis_range& result = required(range, "range");
+    const vulkan::BufferRange found = must(source.drivenRange(handleOf(pose)));
+    result = {found.buffer, found.offset, found.size};
+  });
+}
+
 }  // extern "C"
