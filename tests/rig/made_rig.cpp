@@ -77,8 +77,6 @@ std::array<float, 4> quaternionAbout(const glm::dvec3& axis, double angle) {
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 glm::dmat4 randomScale(std::mt19937& random) {
   return glm::scale(glm::dmat4(1),
                     {between(random, 0.5, 2), between(random, 0.5, 2), between(random, 0.5, 2)});

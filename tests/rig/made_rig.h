@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <span>
 #include <utility>
@@ -15,6 +16,7 @@
 
 namespace dermis::test {
 
+inline constexpr double pi = std::numbers::pi;
 inline constexpr std::uint32_t noRigJoint = 0xffffffffu;
 
 struct MadeRig {

@@ -15,8 +15,6 @@
 namespace dermis::test {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 namespace in_double {
 
 [[maybe_unused]] double squareRoot(double square) {

@@ -211,7 +211,6 @@ double boundOfTwist(const glm::dmat4& turn, const glm::dmat4& above = glm::dmat4
 
 TEST(RigBoundsAreInfinite, WhereRoundingDecidesAndNowhereElse) {
   EXPECT_LT(boundOfTwist(glm::dmat4(1)), 6e-6);
-  const double pi = 3.14159265358979;
   const glm::dvec3 x(1, 0, 0), y(0, 1, 0);
   EXPECT_LT(boundOfTwist(rotationAbout(x, pi - 2e-5)), 1e-5);
   EXPECT_TRUE(std::isinf(boundOfTwist(rotationAbout(x, pi))));
