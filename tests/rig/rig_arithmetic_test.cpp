@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "made_rig.h"
 #include "random_number.h"
 #include "rig/blob.h"
 #include "rig/solve.h"
