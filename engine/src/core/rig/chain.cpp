@@ -133,7 +133,12 @@ SegmentShare segmentAt(const RestCurve& curve, const ChainDriver& chain, double 
     if (end == 0) return chain.joints.front();
     return end == chain.segments ? chain.joints.back() : chain.firstDriven + (end - 1);
   };
-  return {jointAt(segment), jointAt(segment + 1), std::clamp(place - segment, 0.0, 1.0)};
+  // Nobody sees a smaller share, but it takes the time of an influence.
+  constexpr double least = 1e-4;
+  double share = std::clamp(place - segment, 0.0, 1.0);
+  if (share < least) share = 0;
+  if (share > 1 - least) share = 1;
+  return {jointAt(segment), jointAt(segment + 1), share};
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "plan/check.h"
 #include "scene/slot_map.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 namespace {

@@ -6,6 +6,7 @@
 #include "rig/blob.h"
 #include "scene/books.h"
 #include "scene/slot_map.h"
+#include "strict_floating_point.h"
 
 namespace dermis {
 
