@@ -388,7 +388,8 @@ TEST_F(CClipsTest, FiguresHaveRigs) {
   expectOk(dermis_add_figures(scene, clipsOfScene, rigs.data(), 1, 2, figures.data(), &error));
   expectError(dermis_remove_rig(scene, rigs[0], &error), "is used by 2 poses");
   expectOk(dermis_remove_rig(scene, rigs[1], &error));
-  refused("rig 1: it was removed", &rigs[1], 1);
+  expectError(dermis_add_figures(scene, clipsOfScene, &rigs[1], 1, 2, figures.data(), &error),
+              "there is no rig 1 of generation 1; it was removed");
 }
 
 }  // namespace

@@ -137,11 +137,11 @@ class DERMIS_CORE_API PackedRig {
   /// The blob.
   std::span<const std::byte> bytes() const { return std::as_bytes(std::span(words_)); }
 
-  std::uint32_t writtenJoints() const;
-  std::uint32_t drivenJoints() const;
-  std::uint32_t givenWeights() const;
-  std::uint32_t drivenWeights() const;
-  std::uint32_t weightsOf() const;  ///< `RigView::weightsOf`
+  std::uint32_t writtenJoints() const;  ///< `RigView::writtenJoints`
+  std::uint32_t drivenJoints() const;   ///< the joints after them
+  std::uint32_t givenWeights() const;   ///< `RigView::givenWeights`
+  std::uint32_t drivenWeights() const;  ///< `RigView::drivenWeights`
+  std::uint32_t weightsOf() const;      ///< `RigView::weightsOf`
   /// Whether driven joints are rigid whenever the written ones are: up to rounding they have no
   /// scale and no shear.
   bool isRigid() const;
@@ -181,9 +181,9 @@ DERMIS_CORE_API Result<void> evaluateRig(const PackedRig& rig, std::span<const J
                                          std::span<JointMatrix> driven, std::span<float> weights);
 
 /// A copy of a mesh whose vertices follow a chain: what its joints move is divided between the two
-/// ends of the segment to which a vertex is nearest in bind pose, in proportion. Weights of other
-/// joints stay. `joints` are those of the rig. Driven joints are already in the numbering of the
-/// mesh, which need not use them.
+/// ends of the segment to which a vertex is nearest in bind pose, in proportion; a share of less
+/// than 1/10,000 goes to the other end. Weights of other joints stay. `joints` are those of the
+/// rig. Driven joints are already in the numbering of the mesh, which need not use them.
 ///
 /// O(vertices × joints of the chain). Fails with `invalidMesh` as `repair` does, and with
 /// `invalidArgument` as `packRig` does for the chain.
