@@ -186,7 +186,7 @@ struct StepRecord {
 DERMIS_CONSTANT STEP_WORDS = 4u;
 
 // ---- Rigs: engine/src/core/rig/blob.h has the records. Of a rig, kernels know:
-DERMIS_CONSTANT RIG_COUNTS = 4u;  // words: written and driven joints, given and driven weights
+DERMIS_CONSTANT RIG_COUNTS = 4u;   // words: written and driven joints, given and driven weights
 DERMIS_CONSTANT RIG_DRIVERS = 8u;  // words: the offset of the drivers, and their number
 DERMIS_CONSTANT RIG_DRIVER_WORDS = 4u;
 DERMIS_CONSTANT RIG_TWIST = 0u;  // kinds of drivers
@@ -395,7 +395,7 @@ struct MorphListRecord {
 };
 DERMIS_CONSTANT MORPH_LIST_WORDS = 20u;
 DERMIS_CONSTANT MORPH_LIST_DRIVEN = 16u;  // the word of `listed`
-DERMIS_CONSTANT MORPH_LIST_LAYERS = 8u;  // the word of `time0`
+DERMIS_CONSTANT MORPH_LIST_LAYERS = 8u;   // the word of `time0`
 DERMIS_CONSTANT MORPH_LIST_NO_CLIPS = 0xffffffffu;
 
 // The result of an instance: the bounds of its skinned positions, and the number of clamped
