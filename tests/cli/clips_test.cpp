@@ -188,7 +188,8 @@ TEST_F(ClipsTest, CompareShowsThem) {
   EXPECT_NE(result.output.find("clip 1 'walk' at "), std::string::npos) << result.output;
   const CommandResult builtIn = dermis({"compare", "-o", "a.png", "--clips", path("walk.gltf")});
   EXPECT_EQ(builtIn.status, 2);
-  EXPECT_NE(builtIn.errors.find("--clips, --rig, --animation and --time need a MODEL"), std::string::npos)
+  EXPECT_NE(builtIn.errors.find("--clips, --rig, --animation and --time need a MODEL"),
+            std::string::npos)
       << builtIn.errors;
 }
 
