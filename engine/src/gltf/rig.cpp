@@ -379,8 +379,8 @@ class RigReader {
       failInvalid("the rig: no mesh of the skin has the morph target ", inQuotes(*given.begin()),
                   given.size() == 1 ? "" : " and the others that linear drivers read");
     for (const auto& [name, driven] : drivenWeights_) {
-      const bool isTarget = std::ranges::any_of(meshes, [&](std::uint32_t mesh) {
-        return findTarget(model_.meshes[mesh], name) != none;
+      const bool isTarget = std::ranges::any_of(meshes, [&, &target = name](std::uint32_t mesh) {
+        return findTarget(model_.meshes[mesh], target) != none;
       });
       if (!isTarget && !read.contains(name))
         failInvalid("driver ", driven.second, ": no mesh of the skin has the morph target ",
