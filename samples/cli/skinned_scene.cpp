@@ -158,8 +158,8 @@ Result<std::string> readText(const std::string& name) {
   return text;
 }
 
-/// Applies the rigs of the skins that are used. A rig of a file of its own is for those that have
-/// its joints, at least one.
+/// Applies the rigs of all skins that have a mesh. A file of `--rig` is applied to each skin that
+/// has its joints, and fails if no skin has them.
 Result<void> addRigs(Scene& scene, const std::string& file, const MeshPreparation& preparation) {
   if (preparation.rig == "none") return {};
   std::optional<std::string> own;

@@ -83,7 +83,7 @@ TEST(RigTwist, ASwingGivesNone) {
     const glm::dvec3 about = glm::normalize(glm::cross(arm.axis, randomDirection(random)));
     const glm::dmat4 swing = rotationAbout(about, between(random, -3, 3));
     ASSERT_LT(differenceOf(arm.driven(swing, above), above), 2e-5);
-    // After a swing the twist is found all the same.
+    // A swing after the twist does not change the twist.
     const double angle = between(random, -3, 3);
     const glm::dmat4 twist = rotationAbout(arm.axis, angle);
     ASSERT_LT(differenceOf(arm.driven(swing * twist, above), above * arm.turned(twist)), 2e-4);
