@@ -164,26 +164,24 @@ struct MorphBlockRecord {
 };
 DERMIS_CONSTANT MORPH_BLOCK_WORDS = 4u;
 
-// ---- Clips: the bank that packClips makes (engine/src/core/clips/bank.h has its records), then a
-// word for each of its nodes, then steps (StepRecord). Of a bank, kernels know:
+// ---- Clips: the bank that packClips makes (engine/src/core/clips/bank.h has its records), then
+// steps (StepRecord). Of a bank, kernels know:
 DERMIS_CONSTANT CLIPS_OFFSETS = 8u;  // words: the offsets of nodes, skins, clips and masks
 DERMIS_CONSTANT CLIP_NODE_WORDS = 16u;
 DERMIS_CONSTANT CLIP_WORDS = 8u;
 DERMIS_CONSTANT CLIP_CLASS_WORDS = 8u;
 DERMIS_CONSTANT TRACK_COLUMN_BITS = 22u;
-// The word of a node: by which matrix of the figure its transform is multiplied from the left.
-DERMIS_CONSTANT CLIP_ROOT = 0xffffffffu;    // by none
-DERMIS_CONSTANT CLIP_GLOBAL = 0x80000000u;  // flag: the matrix is a global transform
 
-// A product that the compose kernel computes: of `matrix` and the transforms of a node and of what
-// is above it.
+// A product that the compose kernel computes: of `matrix`, which is multiplied from the left by
+// transforms of the figure, one after the other: that of a node and those of what is above it.
+DERMIS_CONSTANT MAX_CHAIN = 9u;
 struct StepRecord {
-  uint node;    // or CLIP_ROOT: only the matrix
   uint matrix;  // word offset in the bank; 0: the identity
   uint place;   // the joint of the figure's poses, or if `matrix` is 0 a global transform
-  uint reserved;
+  uint chainLength;
+  uint chain[MAX_CHAIN];
 };
-DERMIS_CONSTANT STEP_WORDS = 4u;
+DERMIS_CONSTANT STEP_WORDS = 12u;
 
 // ---- Rigs: engine/src/core/rig/blob.h has the records. Of a rig, kernels know:
 DERMIS_CONSTANT RIG_COUNTS = 4u;   // words: written and driven joints, given and driven weights
@@ -237,8 +235,8 @@ DERMIS_CONSTANT UNITS_OF_SCALE_SHEAR = 2u;
 struct BankRecord {
   uint clips;  // the bank
   uint nodeCount;
-  uint above;  // the words of the nodes
-  uint reserved;
+  uint reserved0;
+  uint reserved1;
 };
 DERMIS_CONSTANT BANK_WORDS = 4u;
 struct BandRecord {

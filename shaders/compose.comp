@@ -36,27 +36,28 @@ void main() {
   if ((figure.z & FIGURE_NEEDED) == 0u) return;
   BankRecord bank = loadBank(figure.w);
   BandRecord band = loadBand(figure.w + BANK_WORDS + push.band * BAND_WORDS);
-  for (uint index = gl_LocalInvocationID.x; index < band.stepCount; index += gl_WorkGroupSize.x) {
-    uvec4 unit = clipUnit(band.steps / 4u + index);
-    StepRecord step = StepRecord(unit.x, unit.y, unit.z, unit.w);
-    bool isJoint = step.matrix != 0u;
-    uint matrix = step.node;
-    Transform product;
-    if (isJoint) {
-      product = loadTransform(bank.clips + step.matrix);
-    } else {
-      product = transformOf(figure.x, matrix);
-      matrix = clipWord(bank.above + matrix);
-    }
-    while (matrix != CLIP_ROOT) {
-      product = multiply(transformOf(figure.x, matrix & ~CLIP_GLOBAL), product);
-      if ((matrix & CLIP_GLOBAL) != 0u) break;
-      matrix = clipWord(bank.above + matrix);
-    }
+  uint index = gl_LocalInvocationID.x;
+  // Loops test at their end, for lavapipe (cpu_device/skin_instances.glsl).
+  if (index < band.stepCount) do {
+    uint word = band.steps + index * STEP_WORDS;
+    uvec4 step = clipUnit(word / 4u);  // the first words of a StepRecord
+    uvec4 chain0 = clipUnit(word / 4u + 1u);
+    uvec4 chain1 = clipUnit(word / 4u + 2u);
+    bool isJoint = step.x != 0u;
+    Transform product = Transform(vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
+    if (isJoint) product = loadTransform(bank.clips + step.x);
+    uint matrix = step.w;
+    uint left = step.z;
+    if (left != 0u) do {
+      product = multiply(transformOf(figure.x, matrix), product);
+      matrix = chain0.x;
+      chain0 = uvec4(chain0.yzw, chain1.x);
+      chain1 = chain1.yzww;
+    } while (--left != 0u);
     uvec4 r0 = floatBitsToUint(product.r0);
     uvec4 r1 = floatBitsToUint(product.r1);
     uvec4 r2 = floatBitsToUint(product.r2);
-    uint place = (isJoint ? figure.y : figure.x) + step.place * UNITS_OF_TRANSFORM;
+    uint place = (isJoint ? figure.y : figure.x) + step.y * UNITS_OF_TRANSFORM;
     if (isJoint) {
       joints[place] = r0;
       joints[place + 1u] = r1;
@@ -66,5 +67,6 @@ void main() {
       transforms[place + 1u] = r1;
       transforms[place + 2u] = r2;
     }
-  }
+    index += gl_WorkGroupSize.x;
+  } while (index < band.stepCount);
 }

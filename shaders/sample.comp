@@ -1,6 +1,5 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 
 // Samples the local transforms of figures: for each node the weighted mean of its layers, to which additive layers are added. A
 // workgroup for each figure, an invocation for each of its nodes (docs/clips.md).
@@ -15,10 +14,18 @@ layout(push_constant) uniform Push { SamplePush push; };
 
 layout(set = 0, binding = BINDING_PALETTES, std430) restrict writeonly buffer Transforms { uvec4 transforms[]; };
 
-// The time and the bits of a layer.
-uvec2 layerAt(uint word) {
-  uvec4 two = tableUnit(word);
-  return word % 4u == 0u ? two.xy : two.zw;
+// Loops test at their end, for lavapipe (cpu_device/skin_instances.glsl).
+
+// Of a figure.
+struct Layers {
+  uvec4 first;  // the time and the bits of two layers
+  uvec4 last;
+  uint count;
+};
+
+uvec2 layerAt(Layers layers, uint number) {
+  uvec4 two = number < 2u ? layers.first : layers.last;
+  return (number & 1u) == 0u ? two.xy : two.zw;
 }
 
 // Of a layer, for a node. `masks`: the offset of the masks in the bank.
@@ -49,51 +56,76 @@ Local meanOf(Local sum, bool hasWeight, Local rest) {
   return Local(sum.translation, unitOrIdentity(sum.rotation), sum.scale);
 }
 
+// `tracks`: the word of the first of a node's three. `still`: what tracks without numbers have.
+Local sampleTracks(ClipTime at, uint tracks, Local still) {
+  Local value = still;
+  uvec3 words = clipThreeWords(tracks);  // translation, rotation, scale
+  bvec3 isLeft = notEqual(words >> 30u, uvec3(TRACK_AT_REST));
+  // Rarely more than the rotation: once for most nodes.
+  if (any(isLeft)) do {
+    bool isRotation = isLeft.y;
+    bool isTranslation = !isLeft.y && isLeft.x;
+    uint word = isRotation ? words.y : isTranslation ? words.x : words.z;
+    vec4 x = sampleTrack(at, word, isRotation);
+    if (isRotation) {
+      value.rotation = x;
+      isLeft.y = false;
+    } else if (isTranslation) {
+      value.translation = x;
+      isLeft.x = false;
+    } else {
+      value.scale = x;
+      isLeft.z = false;
+    }
+  } while (any(isLeft));
+  return value;
+}
+
 // `offsets` are those of the bank.
-Local sampleNode(uint firstLayer, uint layersEnd, BankRecord bank, uvec4 offsets, uint node, Local rest) {
+Local sampleNode(Layers layers, BankRecord bank, uvec4 offsets, uint node, Local rest) {
+  if (layers.count == 0u) return rest;
   precise float weights = 0.0;
-  for (uint word = firstLayer; word < layersEnd; word += 2u) {
-    uint bits = layerAt(word).y;
+  uint number = 0u;
+  do {
+    uint bits = layerAt(layers, number).y;
     if ((bits & LAYER_ADDITIVE) == 0u) weights = weights + weightOf(bits, bank, offsets.w, node);
-  }
+  } while (++number < layers.count);
   Local value = Local(vec4(0.0), vec4(0.0), vec4(0.0));
   vec4 first = vec4(0.0);
   bool hasWeight = false;
   bool isMean = false;
-  for (uint word = firstLayer; word < layersEnd; word += 2u) {
-    uvec2 layer = layerAt(word);
+  number = 0u;
+  do {
+    uvec2 layer = layerAt(layers, number++);
     bool isAdditive = (layer.y & LAYER_ADDITIVE) != 0u;
     float weight = weightOf(layer.y, bank, offsets.w, node);
-    if (!isAdditive && !(weight > 0.0)) continue;
     if (isAdditive && !isMean) {
       value = meanOf(value, hasWeight, rest);
       isMean = true;
     }
+    if (!isAdditive && !(weight > 0.0)) continue;
     float share = isAdditive ? weight : quotient(weight, weights);
     uint unit = (bank.clips + offsets.z + (layer.y & 1023u) * CLIP_WORDS) / 4u;
     uvec4 ofClip = clipUnit(unit + 1u);  // offsets of classes and tracks
     precise float frame = uintBitsToFloat(layer.x) * uintBitsToFloat(clipUnit(unit).y);
-    ClipTime at = ClipTime(bank.clips, ofClip.x, frame);
-    uint tracks = bank.clips + ofClip.y + 3u * node;
-    [[dont_unroll]] for (uint path = 0u; path < 3u; ++path) {
-      vec4 still = path == PATH_ROTATION ? rest.rotation : path == PATH_SCALE ? rest.scale : rest.translation;
-      if (isAdditive) still = path == PATH_ROTATION ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(path == PATH_SCALE ? 1.0 : 0.0);
-      vec4 x = sampleTrack(at, clipWord(tracks + path), path == PATH_ROTATION, still);
-      if (path == PATH_ROTATION) {
-        if (!hasWeight) first = x;
-        precise vec4 sum = fma(vec4(dot4(first, x) < 0.0 ? -share : share), x, value.rotation);
-        value.rotation = isAdditive ? addedRotation(value.rotation, x, weight) : sum;
-      } else if (path == PATH_SCALE) {
-        precise vec4 sum = fma(vec4(share), x, value.scale);
-        precise vec4 grown = value.scale * (1.0 + share * (x - 1.0));
-        value.scale = isAdditive ? grown : sum;
-      } else {
-        precise vec4 sum = fma(vec4(share), x, value.translation);
-        value.translation = sum;
-      }
+    Local still = rest;
+    if (isAdditive) still = Local(vec4(0.0), vec4(0.0, 0.0, 0.0, 1.0), vec4(1.0));
+    Local x = sampleTracks(ClipTime(bank.clips, ofClip.x, frame), bank.clips + ofClip.y + 3u * node, still);
+    precise vec4 translation = fma(vec4(share), x.translation, value.translation);
+    value.translation = translation;
+    if (isAdditive) {
+      value.rotation = addedRotation(value.rotation, x.rotation, weight);
+      precise vec4 scale = value.scale * (1.0 + share * (x.scale - 1.0));
+      value.scale = scale;
+    } else {
+      if (!hasWeight) first = x.rotation;
+      precise vec4 rotation = fma(vec4(dot4(first, x.rotation) < 0.0 ? -share : share), x.rotation, value.rotation);
+      precise vec4 scale = fma(vec4(share), x.scale, value.scale);
+      value.rotation = rotation;
+      value.scale = scale;
     }
     hasWeight = true;
-  }
+  } while (number < layers.count);
   return isMean ? value : meanOf(value, hasWeight, rest);
 }
 
@@ -103,18 +135,18 @@ void main() {
   uint record = push.figures + number * FIGURE_WORDS;
   uvec4 figure = tableUnit(record);  // the first words of a FigureRecord
   if ((figure.z & FIGURE_NEEDED) == 0u) return;
-  uint firstLayer = record + 4u;
-  uint layersEnd = firstLayer + 2u * (figure.z & ~FIGURE_NEEDED);
+  Layers layers = Layers(tableUnit(record + 4u), tableUnit(record + 8u), figure.z & ~FIGURE_NEEDED);
   BankRecord bank = loadBank(figure.w);
   uvec4 offsets = clipUnit((bank.clips + CLIPS_OFFSETS) / 4u);
-  for (uint node = gl_LocalInvocationID.x; node < bank.nodeCount; node += gl_WorkGroupSize.x) {
+  uint node = gl_LocalInvocationID.x;
+  if (node < bank.nodeCount) do {
     uint unit = (bank.clips + offsets.x + node * CLIP_NODE_WORDS) / 4u;
     uvec4 a = clipUnit(unit);
     vec4 b = uintBitsToFloat(clipUnit(unit + 1u));
     vec4 c = uintBitsToFloat(clipUnit(unit + 2u));
     Local rest = Local(vec4(uintBitsToFloat(a.w), b.xy, 0.0), vec4(b.zw, c.xy),
                        vec4(c.zw, uintBitsToFloat(clipUnit(unit + 3u).x), 0.0));
-    Local sampled = sampleNode(firstLayer, layersEnd, bank, offsets, node, rest);
+    Local sampled = sampleNode(layers, bank, offsets, node, rest);
     vec3 r0;
     vec3 r1;
     vec3 r2;
@@ -128,5 +160,6 @@ void main() {
     transforms[place] = floatBitsToUint(local.r0);
     transforms[place + 1u] = floatBitsToUint(local.r1);
     transforms[place + 2u] = floatBitsToUint(local.r2);
-  }
+    node += gl_WorkGroupSize.x;
+  } while (node < bank.nodeCount);
 }

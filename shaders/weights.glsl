@@ -55,7 +55,8 @@ vec3 sampleGroup(WeightSource source, float sum, uint group) {
     uvec4 ofClip = clipUnit(unit + 1u);  // offsets of classes and tracks
     precise float frame = layer.time * uintBitsToFloat(clipUnit(unit).y);
     uint track = clipWord(source.clips + ofClip.y + source.track + group);
-    vec3 x = sampleTrack(ClipTime(source.clips, ofClip.x, frame), track, false, isAdditive ? vec4(0.0) : rest).xyz;
+    vec3 x = isAdditive ? vec3(0.0) : rest.xyz;
+    if (trackKind(track) != TRACK_AT_REST) x = sampleTrack(ClipTime(source.clips, ofClip.x, frame), track, false).xyz;
     float share = isAdditive ? layer.factor : quotient(layer.factor, sum);
     precise vec3 next = fma(vec3(share), x, value);
     value = next;

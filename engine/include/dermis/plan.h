@@ -65,7 +65,8 @@ inline constexpr std::uint32_t storageBuffersWanted = 8;
 
 /// How work is divided among invocations. It affects speed only: results are equal to the bit.
 struct Tuning {
-  std::uint32_t workgroupSize = 64;  ///< invocations; a power of two from 8 to 128
+  /// Invocations; a power of two from 8 to 128. CPU devices sample clips with 8.
+  std::uint32_t workgroupSize = 64;
   /// Maximum instances for which one invocation skins its vertex, 1 to 32.
   std::uint32_t instancesPerInvocation = 4;
   /// A dispatch with fewer workgroups than this uses fewer instances per invocation: half as many,

@@ -55,7 +55,7 @@ static_assert(sizeof(abi::MorphBlockRecord) == abi::MORPH_BLOCK_WORDS * 4 &&
 static_assert(sizeof(abi::FigureRecord) == abi::FIGURE_WORDS * 4 && abi::FIGURE_WORDS % 4 == 0);
 static_assert(sizeof(abi::BankRecord) == abi::BANK_WORDS * 4 && abi::BANK_WORDS == 4);
 static_assert(sizeof(abi::BandRecord) == abi::BAND_WORDS * 4 && abi::BAND_WORDS == 4);
-static_assert(sizeof(abi::StepRecord) == abi::STEP_WORDS * 4 && abi::STEP_WORDS == 4);
+static_assert(sizeof(abi::StepRecord) == abi::STEP_WORDS * 4 && abi::STEP_WORDS % 4 == 0);
 static_assert(sizeof(abi::CandidateRecord) == abi::CANDIDATE_WORDS * 4);
 static_assert(sizeof(abi::RigRecord) == abi::RIG_WORDS * 4 && abi::RIG_WORDS % 4 == 0);
 static_assert(sizeof(abi::MorphListRecord) == abi::MORPH_LIST_WORDS * 4 &&

@@ -132,11 +132,11 @@ Result<void> Encoder::addFigureDispatches() {
   for (std::size_t i = 0; i < work_->banks.size(); ++i) {
     const Work::Bank& bank = work_->banks[i];
     const DeviceClips& clips = *bank.clips;
-    store(tables, i * bankWords, abi::BankRecord{bank.words, clips.nodeCount, bank.deviceWords, 0});
+    store(tables, i * bankWords, abi::BankRecord{bank.words, clips.nodeCount, 0, 0});
     std::uint32_t begin = 0;
     for (std::size_t band = 0; band < clips.bandEnds.size(); ++band) {
       store(tables, i * bankWords + abi::BANK_WORDS + band * abi::BAND_WORDS,
-            abi::BandRecord{bank.deviceWords + clips.firstStep + begin * abi::STEP_WORDS,
+            abi::BandRecord{bank.deviceWords + begin * abi::STEP_WORDS,
                             clips.bandEnds[band] - begin, 0, 0});
       begin = clips.bandEnds[band];
     }

@@ -216,6 +216,8 @@ Variant variantOf(Kernel kernel, const DeviceLimits& limits, const Tuning& tunin
 Variant poseVariant(Kernel kernel, const DeviceLimits& limits, const Tuning& tuning) {
   Variant variant = variantOf(kernel, limits, tuning);
   variant.texels = storesWidely(limits);
+  // A workgroup has the nodes of a figure: those beyond the last cost lavapipe as much as others.
+  if (variant.texels && kernel != Kernel::rig) variant.workgroupSize = 8;
   return variant;
 }
 
