@@ -261,6 +261,37 @@ TEST(ClipsRefused, AnErrorThatCannotBeKept) {
       << message;
 }
 
+// A small file may name many nodes and clips, or have two near keys in a long clip.
+TEST(ClipsRefused, ClipsThatTakeMuchMoreMemoryThanTheirSource) {
+  PackedRig rig(armRig());
+  rig.clips.assign(1, ClipView{.name = "short", .duration = 1, .channels = {}});
+  const Floats times{0, 1}, moved{0, 0, 0, 1, 0, 0};
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    const auto node = static_cast<std::uint32_t>(rig.skeleton.nodes.size());
+    rig.skeleton.nodes.emplace_back();
+    rig.clips[0].channels.push_back(
+        {node, ChannelPath::translation, Interpolation::linear, times, moved});
+  }
+  ASSERT_TRUE(rig.pack());
+  rig.clips.resize(1000, ClipView{.name = "empty", .duration = 0, .channels = {}});
+  expectRefused(rig, ErrorCode::limitExceeded, {"empty", "memory"});
+}
+
+TEST(ClipsRefused, KeysThatTakeMuchMoreMemoryThanTheirSource) {
+  PackedRig rig(armRig());
+  rig.options.maxError = 0.01;
+  const Floats times{0, 0.003f, 0.006f}, moved{0, 0, 0, 1, 0, 0, 0, 0, 0};
+  rig.clips.assign(1, ClipView{.name = "long", .duration = 1600, .channels = {}});
+  // Each track needs half a million keys.
+  for (int i = 0; i < 12; ++i) {
+    const auto node = static_cast<std::uint32_t>(rig.skeleton.nodes.size());
+    rig.skeleton.nodes.emplace_back();
+    rig.clips[0].channels.push_back(
+        {node, ChannelPath::translation, Interpolation::step, times, moved});
+  }
+  expectRefused(rig, ErrorCode::limitExceeded, {"long", "memory"});
+}
+
 // Found by a fuzzer: what was packed could not be read again.
 TEST(ClipsRefused, NumbersBeyondFloat32) {
   expectRefused([](PackedRig& rig) { (*rig.skeleton.nodes[arm::prop].matrix)[2][3] = 1e200; },

@@ -79,7 +79,12 @@ struct Needs {
 class Packer {
  public:
   Packer(const Skeleton& skeleton, std::span<const ClipView> clips, const PackClipsOptions& options)
-      : skeleton_(skeleton), clips_(clips), options_(options) {}
+      : skeleton_(skeleton), clips_(clips), options_(options) {
+    for (const ClipView& clip : clips) {
+      for (const ChannelView& channel : clip.channels)
+        memoryLeft_ += 64 * (channel.times.size_bytes() + channel.values.size_bytes());
+    }
+  }
 
   Result<std::vector<std::uint32_t>> pack(PackClipsReport& report) {
     findChannels();
@@ -98,6 +103,21 @@ class Packer {
   }
 
  private:
+  /// Takes memory for what is packed. Returns false if there is not enough left.
+  bool spend(std::uint64_t bytes) {
+    if (bytes > memoryLeft_) return false;
+    memoryLeft_ -= bytes;
+    return true;
+  }
+  bool spend(const Track& track) {
+    return spend(track.keys.size() * (2 * sizeof(KeyBits)) + track.jumps.size() * 2);
+  }
+  Error tooLarge(std::size_t clip) const {
+    return {ErrorCode::limitExceeded, "packClips: " + titled("clip", clip, clips_[clip].name) +
+                                          ": the keys of the clips so far take more memory than "
+                                          "64 MiB and 64 times that of the source"};
+  }
+
   /// By node and path. Keys of rotations get unit length, which they need between keys.
   void findChannels() {
     channels_.resize(clips_.size());
@@ -369,6 +389,7 @@ class Packer {
     motion_->rotationError =
         std::max(motion_->rotationError,
                  static_cast<float>(error / double{motion_->length} * (1 + 0x1p-23)));
+    if (!spend(*track)) return tooLarge(number);
     packed.vectorTracks.back() = *std::move(track);
     return {};
   }
@@ -394,6 +415,7 @@ class Packer {
             fitTrack(curve, clip.additive ? Value{} : rest, duration, packed.rate, tolerance);
         if (!track)
           return unkept(where(number, node.source), "maxWeightError", tolerance, packed.rate);
+        if (!spend(sizeof(Track)) || !spend(*track)) return tooLarge(number);
         node.error = std::max(node.error, static_cast<float>(track->error * (1 + 0x1p-23)));
         packed.vectorTracks.push_back(*std::move(track));
       }
@@ -412,6 +434,7 @@ class Packer {
 
   Result<FittedClip> packClip(std::size_t number, PackClipsReport& report) {
     FittedClip packed;
+    if (!spend(moved_.size() * 3 * sizeof(Track))) return tooLarge(number);
     const double duration = double{static_cast<float>(clips_[number].duration)};
     packed.rate = double{static_cast<float>(rateOf(clips_[number]))};
     const std::vector<std::array<Curve, 3>> source = curvesOf(number);
@@ -431,7 +454,9 @@ class Packer {
     double share = 1, worst = 0;
     std::size_t worstNode = 0;
     double worstTime = 0;
+    const std::uint64_t memoryLeft = memoryLeft_;
     for (int attempt = 0; attempt < 16; ++attempt, share *= 0.6) {
+      memoryLeft_ = memoryLeft;
       packed.tracks.assign(moved_.size(), {});
       for (std::size_t i = 0; i < moved_.size(); ++i) {
         const Needs& need = needs[i];
@@ -443,6 +468,7 @@ class Packer {
               fitTrack(curves[i][p], stillOf(number, i)[p], duration, packed.rate, tolerances[p]);
           if (!track)
             return unkept(where(number, moved_[i].source), "maxError", maxError_, packed.rate);
+          if (!spend(*track)) return tooLarge(number);
           packed.tracks[i][p] = *std::move(track);
         }
       }
@@ -606,6 +632,7 @@ class Packer {
   const Skeleton& skeleton_;
   std::span<const ClipView> clips_;
   const PackClipsOptions& options_;
+  std::uint64_t memoryLeft_ = std::uint64_t{64} << 20;  ///< bytes
   std::vector<std::map<std::pair<std::uint32_t, ChannelPath>, ChannelView>> channels_;
   std::deque<std::vector<float>> changedKeys_;  ///< which channels point to
   std::vector<MovedNode> moved_;
