@@ -152,15 +152,17 @@ void add(LocalTransform& local, const LocalTransform& difference, float weight) 
 
 /// The bits of the nearest float16. Ties go to the even one. Infinite above its range.
 std::uint16_t toHalf(float value) {
-  const std::uint32_t sign = std::signbit(value) ? 0x8000u : 0u;
-  const float size = std::abs(value);
-  if (!(size < 65520)) return static_cast<std::uint16_t>(sign | 0x7c00u);
-  // A step is 2^-24 below 2^-14, and 2^-10 of the largest power of two below `size` above.
-  const int exponent = size == 0 ? -14 : std::max(std::ilogb(size), -14);
-  const auto steps = static_cast<std::uint32_t>(std::nearbyint(std::ldexp(size, 10 - exponent)));
-  // 1024 steps and more are a normal number, whose exponent they raise.
-  return static_cast<std::uint16_t>(sign |
-                                    (static_cast<std::uint32_t>(exponent + 14) * 1024 + steps));
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const std::uint32_t sign = bits >> 16 & 0x8000u, size = bits & 0x7fffffffu;
+  std::uint32_t half;
+  if (size >= 0x477ff000u) {  // 65520
+    half = 0x7c00;
+  } else if (size < 0x38800000u) {  // denormal: floats from 0.5 on count 2^-24, too
+    half = std::bit_cast<std::uint32_t>(std::bit_cast<float>(size) + 0.5f) - 0x3f000000u;
+  } else {  // 13 bits fewer, and an exponent that is less by 112
+    half = ((size + 0xfffu + (size >> 13 & 1u)) >> 13) - (112u << 10);
+  }
+  return static_cast<std::uint16_t>(sign | half);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -58,6 +59,10 @@ DERMIS_CORE_API Result<void> checkSetup(const SceneSetup& setup);
 DERMIS_CORE_API SceneSetup rounded(SceneSetup setup);
 /// The initial sizes of a scene's buffers; for poses, of the first buffer of each kind.
 DERMIS_CORE_API PlanSizes sceneSizes(const SceneSetup& setup);
+
+/// How many objects ahead a loop over many of them fetches: skinning on the CPU evicts them from
+/// its caches.
+inline constexpr std::size_t prefetchDistance = 8;
 
 /// A buffer that the owner created.
 struct SceneBufferMemory {

@@ -164,10 +164,12 @@ Result<void> Scene::play(std::span<const FigurePlay> plays) {
   SceneBooks& books = changed();
   std::vector<PackedLayers>& packed = books.layersScratch_;
   packed.clear();
-  for (const FigurePlay& play : plays) {
+  for (std::size_t entry = 0; entry < plays.size(); ++entry) {
+    const FigurePlay& play = plays[entry];
+    if (entry + prefetchDistance < plays.size())
+      books.figures_.prefetch(plays[entry + prefetchDistance].figure.index);
     const auto refused = [&](const Error& error) {
-      return Error{error.code,
-                   "entry " + std::to_string(&play - plays.data()) + ": " + error.message};
+      return Error{error.code, "entry " + std::to_string(entry) + ": " + error.message};
     };
     const SceneFigure* figure = books.figures_.find(play.figure);
     if (figure == nullptr) return refused(unknownHandle("figure", play.figure));

@@ -100,8 +100,9 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
 }
 
 void SceneBooks::gatherPoses() {
-  for (const PoseHandle handle : posed_) {
-    const ScenePose* pose = poses_.find(handle);
+  for (std::size_t i = 0; i < posed_.size(); ++i) {
+    if (i + prefetchDistance < posed_.size()) poses_.prefetch(posed_[i + prefetchDistance].index);
+    const ScenePose* pose = poses_.find(posed_[i]);
     if (pose == nullptr) continue;
     for (std::uint32_t index = pose->firstInstance; index != notUsed;
          index = instances_.at(index).nextOfPose)
@@ -131,6 +132,8 @@ void SceneBooks::gatherPending() {
   std::size_t kept = 0;
   for (std::size_t entry = 0; entry < pending_.size(); ++entry) {
     const InstanceHandle handle = pending_[entry];
+    if (entry + prefetchDistance < pending_.size())
+      instances_.prefetch(pending_[entry + prefetchDistance].index);
     InstanceState* const state = findState(handle);
     if (state == nullptr) continue;
     if (state->need == Need::none || !isDisplayed(state->view)) {

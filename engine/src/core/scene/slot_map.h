@@ -1,6 +1,8 @@
 // Objects by handle: found in O(1). Handles of removed objects are rejected.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -66,6 +68,19 @@ class SlotMap {
   bool hasHole() const { return !free_.empty(); }
   /// Larger than every index so far.
   std::uint32_t capacity() const { return static_cast<std::uint32_t>(slots_.size()); }
+
+  /// Fetches what `find` and `at` will soon be asked for into the caches.
+  void prefetch(std::uint32_t index) const {
+#if defined(__GNUC__)
+    if (index >= slots_.size()) return;
+    const auto* const bytes = reinterpret_cast<const char*>(&slots_[index]);
+    constexpr std::size_t lines = sizeof(Slot) / alignof(Slot);
+    for (std::size_t line = 0; line < std::min<std::size_t>(lines, 4); ++line)
+      __builtin_prefetch(bytes + line * alignof(Slot));
+#else
+    static_cast<void>(index);
+#endif
+  }
 
  private:
   struct alignas(64) Slot {  // a cache line
