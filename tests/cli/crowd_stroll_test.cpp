@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <map>
 #include <set>
 #include <string>
@@ -14,7 +16,11 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "dermis/clips.h"
+#include "dermis/gltf.h"
+#include "dermis/verify.h"
 #include "gait.h"
+#include "kit/program.h"
 #include "stroll.h"
 #include "test_paths.h"
 #include "wardrobe.h"
@@ -23,6 +29,7 @@ namespace crowd_film {
 namespace {
 
 using dermis::samples::Character;
+using dermis::samples::must;
 
 class StrollTest : public ::testing::Test {
  protected:
@@ -130,6 +137,88 @@ TEST_F(StrollTest, TheCameraMovesSmoothly) {
       EXPECT_LT(std::abs(c[axis] - 2 * b[axis] + a[axis]), 0.03) << time;
     }
   }
+}
+
+/// The largest second difference of a vertex of a figure, in meters, in the frames in which its
+/// clips begin anew or fade, and in the others.
+class Jerks {
+ public:
+  Jerks(const Character& character, const dermis::PackedClips& bank)
+      : character_(&character), bank_(&bank) {}
+
+  void add(const FigureState& now) {
+    std::vector<dermis::ClipLayer> layers;
+    const auto addLayer = [&](const dermis::samples::PoseKey& pose, float weight) {
+      if (weight > 0) layers.emplace_back(*character_->layer(pose)).weight = weight;
+    };
+    addLayer(now.pose, 1 - now.beforeWeight);
+    addLayer(now.before, now.beforeWeight);
+    std::vector<glm::dvec3> points;
+    for (const dermis::samples::Part& part : character_->parts()) {
+      std::vector<dermis::JointMatrix> pose(bank_->jointCount(part.skin));
+      must(dermis::samplePose(*bank_, layers, part.skin, pose));
+      const auto skinned =
+          must(dermis::reference::skin(part.primitive.mesh(), pose, dermis::Method::linear));
+      for (const auto& position : skinned.positions)
+        points.emplace_back(position[0], position[1], position[2]);
+    }
+    const bool begins = !frames_.empty() && now.pose.tick < last_.pose.tick;
+    const bool fades = now.beforeWeight > 0 || last_.beforeWeight > 0;
+    loops += begins ? 1 : 0;
+    fadedFrames += fades ? 1 : 0;
+    // A second difference has to do with three frames.
+    beginsIn_.push_back(begins);
+    fadesIn_.push_back(fades);
+    frames_.push_back(std::move(points));
+    last_ = now;
+    if (frames_.size() < 3) return;
+    double largest = 0;
+    for (std::size_t i = 0; i < frames_[0].size(); ++i) {
+      const glm::dvec3 second = frames_[2][i] - 2.0 * frames_[1][i] + frames_[0][i];
+      largest = std::max(largest, glm::length(second));
+    }
+    double& place = fadesIn_[2] || fadesIn_[1]     ? fading
+                    : beginsIn_[2] || beginsIn_[1] ? beginning
+                                                   : other;
+    place = std::max(place, largest);
+    frames_.erase(frames_.begin());
+    beginsIn_.erase(beginsIn_.begin());
+    fadesIn_.erase(fadesIn_.begin());
+  }
+
+  double beginning = 0, fading = 0, other = 0;
+  std::uint32_t loops = 0, fadedFrames = 0;
+
+ private:
+  const Character* character_;
+  const dermis::PackedClips* bank_;
+  FigureState last_;
+  std::vector<std::vector<glm::dvec3>> frames_;
+  std::vector<bool> beginsIn_, fadesIn_;
+};
+
+/// No clip pops where it begins anew, and no figure where it changes its clip.
+TEST_F(StrollTest, FiguresMoveSmoothlyThroughLoopsAndFades) {
+  const Stroll stroll(*character_, *gait_, {});
+  const dermis::PackedClips bank =
+      must(packClips(character_->skeleton(), dermis::gltf::clips(character_->model())));
+  double beginning = 0, fading = 0, other = 0;
+  std::uint32_t loops = 0, fadedFrames = 0;
+  for (const std::uint32_t figure : {0u, 1u, 2u, 3u, 500u}) {
+    Jerks jerks(*character_, bank);
+    for (std::uint64_t frame = 1; frame <= 300; ++frame) jerks.add(stroll.at(figure, frame));
+    std::printf("figure %u: second differences %.2f mm, at loops %.2f mm (%u), in fades %.2f mm\n",
+                figure, 1e3 * jerks.other, 1e3 * jerks.beginning, jerks.loops, 1e3 * jerks.fading);
+    beginning = std::max(beginning, jerks.beginning);
+    fading = std::max(fading, jerks.fading);
+    other = std::max(other, jerks.other);
+    loops += jerks.loops;
+    fadedFrames += jerks.fadedFrames;
+  }
+  EXPECT_GT(loops, 10u);
+  EXPECT_GT(fadedFrames, 40u);
+  EXPECT_LE(beginning, 1.1 * other);
+  EXPECT_LE(fading, 1.1 * other);
 }
 
 TEST_F(StrollTest, WhoIsFarAwayIsUpdatedLessOften) {

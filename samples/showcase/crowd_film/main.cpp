@@ -100,11 +100,16 @@ class SkinnedCrowd {
     must(recorder_.scene().setVisibility(visibility));
     std::vector<ClipLayer> layers;
     std::vector<FigurePlay> plays;
-    layers.reserve(figures_.size());  // plays point to them
+    layers.reserve(2 * figures_.size());  // plays point to them
     for (const Figure& figure : figures_) {
-      const auto layer = character_->layer(figure.now.pose);
-      if (layer) layers.push_back(*layer);
-      plays.push_back({figure.handle, std::span(layers).last(layer ? 1 : 0)});
+      const std::size_t first = layers.size();
+      const auto add = [&](const samples::PoseKey& pose, float weight) {
+        const auto layer = character_->layer(pose);
+        if (layer && weight > 0) layers.emplace_back(*layer).weight = weight;
+      };
+      add(figure.now.pose, 1 - figure.now.beforeWeight);
+      add(figure.now.before, figure.now.beforeWeight);
+      plays.push_back({figure.handle, std::span(layers).subspan(first)});
     }
     must(recorder_.scene().play(plays));
     context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::vertexInput, Use::dermis));

@@ -15,7 +15,7 @@ namespace crowd_film {
 namespace {
 
 /// Purposes of `chance`.
-enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size };
+enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size, changeTime };
 
 // In meters, for a figure of 1.75 m. A long animal is measured by its length.
 constexpr double standingSpacing = 0.95;
@@ -26,6 +26,9 @@ constexpr std::uint32_t ringsOneWay = 3;
 /// Radius of a sphere around the middle of a figure that contains the figure and almost all of its
 /// shadow.
 constexpr double reach = 2.3;
+
+/// A figure that stands chooses a clip every so often, and fades to it.
+constexpr double changeSeconds = 6, fadeSeconds = 0.5;
 
 /// An update may be late as long as the feet move less than this number of pixels.
 constexpr double unseenPixels = 2;
@@ -116,7 +119,7 @@ Eye Stroll::eye(std::uint64_t frame) const {
 
 /// Rotates from the direction in which the clip walks to the direction in which the figure should
 /// walk.
-JointMatrix Stroll::placeAt(const Role& role, double angle) const {
+JointMatrix Stroll::placeAt(const Role& role, double angle, double ground) const {
   const ClipGait& gait = gait_->clips[role.clip];
   const double own = gait.walks() ? std::atan2(gait.stepX, gait.stepZ) : 0;
   const double heading = angle + role.yaw;
@@ -130,10 +133,33 @@ JointMatrix Stroll::placeAt(const Role& role, double angle) const {
   m[1][1] = static_cast<float>(role.scale);
   m[0][3] = static_cast<float>(role.radius * std::cos(angle) - cosine * gait_->middleX -
                                sine * gait_->middleZ);
-  m[1][3] = static_cast<float>(-role.scale * gait.ground);
+  m[1][3] = static_cast<float>(-role.scale * ground);
   m[2][3] = static_cast<float>(role.radius * std::sin(angle) + sine * gait_->middleX -
                                cosine * gait_->middleZ);
   return matrix;
+}
+
+/// Clips play on while others fade in and out.
+void Stroll::pose(std::uint32_t figure, std::uint64_t frame, FigureState& state) const {
+  const Role& role = roles_[figure];
+  const auto keyOf = [&](std::uint32_t clip) -> samples::PoseKey {
+    return {clip,
+            static_cast<std::uint32_t>((clock(frame) + role.phase) % character_->tickCount(clip))};
+  };
+  state.pose = keyOf(role.clip);
+  if (role.step != 0 || standingClips_.size() < 2) return;
+  const double time = static_cast<double>(clock(frame)) / framesPerSecond_ / changeSeconds +
+                      chance(figure, changeTime);
+  const auto turn = static_cast<std::uint32_t>(time);
+  const auto clipIn = [&](std::uint32_t number) {
+    return number == 0 ? role.clip : choose(standingClips_, figure + number * count());
+  };
+  state.pose = keyOf(clipIn(turn));
+  if (turn == 0) return;
+  state.before = keyOf(clipIn(turn - 1));
+  const double t = std::min((time - turn) * changeSeconds / fadeSeconds, 1.0);
+  if (state.before.clip != state.pose.clip)
+    state.beforeWeight = static_cast<float>(1 - t * t * (3 - 2 * t));
 }
 
 FigureState Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
@@ -143,9 +169,13 @@ FigureState Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
                           role.radius * std::sin(angle));
   const Eye seenFrom = eye(frame);
   FigureState state;
-  state.pose = {role.clip, static_cast<std::uint32_t>((clock(frame) + role.phase) %
-                                                      character_->tickCount(role.clip))};
-  state.place = placeAt(role, angle);
+  pose(figure, frame, state);
+  const auto groundOf = [&](const samples::PoseKey& key) { return gait_->clips[key.clip].ground; };
+  const double before = double{state.beforeWeight};
+  state.place =
+      placeAt(role, angle,
+              before == 0 ? groundOf(state.pose)
+                          : (1 - before) * groundOf(state.pose) + before * groundOf(state.before));
   state.isInView = flight_.sees(seenFrom, middle, reach * unit_);
   state.distance = glm::distance(middle, seenFrom.place);
   // Approximate distance that a hand or foot moves in a frame.

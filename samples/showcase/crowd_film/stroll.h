@@ -1,5 +1,5 @@
-// The crowd of the film. Some figures stand in the middle and wave. The others walk around them in
-// rings, at the speed of their feet.
+// The crowd of the film. Some figures stand in the middle and wave now and then. The others walk
+// around them in rings, at the speed of their feet.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,10 @@ struct StrollOptions {
 /// The state of a figure in one frame.
 struct FigureState {
   dermis::samples::PoseKey pose;
+  /// While it changes to another clip: what it did before, and how much of that is left, from 0
+  /// to 1.
+  dermis::samples::PoseKey before;
+  float beforeWeight = 0;
   bool isInView = false;
   std::uint32_t updateInterval = 1;  ///< by the distance from the camera
   double distance = 0;
@@ -54,7 +58,8 @@ class Stroll {
   void castStanding(std::uint32_t figures);
   void castWalking(std::uint32_t figures);
   Flight planFlight(const StrollOptions& options) const;
-  dermis::JointMatrix placeAt(const Role& role, double angle) const;
+  dermis::JointMatrix placeAt(const Role& role, double angle, double ground) const;
+  void pose(std::uint32_t figure, std::uint64_t frame, FigureState& state) const;
   std::uint64_t clock(std::uint64_t frame) const { return frame - 1 + startFrame_; }
 
   const dermis::samples::Character* character_;
