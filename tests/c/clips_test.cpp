@@ -62,6 +62,7 @@ TEST_F(CClipsTest, ABankOfAModelIsThatOfCpp) {
   EXPECT_EQ(info.joint_counts[0], same.jointCount(0));
   ASSERT_EQ(info.clip_count, clips.size());
   EXPECT_EQ(info.mask_count, 0u);
+  EXPECT_EQ(info.morphed_node_count, 0u);
   for (std::uint32_t clip = 0; clip < info.clip_count; ++clip) {
     EXPECT_EQ(info.clips[clip].duration, same.clip(clip).duration);
     EXPECT_EQ(info.clips[clip].is_clamped, 0u);
@@ -166,6 +167,15 @@ TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
   must(sampleWeights(same, {&sameLayer, 1}, 1, expectedWeights));
   EXPECT_EQ(weights, expectedWeights);
   EXPECT_NE(weights, rest);
+  // A loaded bank knows how many a node has.
+  dermis_bank_info info = sized<dermis_bank_info>();
+  Owned<dermis_bank> loaded;
+  expectOk(dermis_bank_contents(bank, &info, &error));
+  expectOk(dermis_bank_load(info.bytes, info.byte_count, &loaded, &error));
+  expectOk(dermis_bank_contents(loaded, &info, &error));
+  ASSERT_EQ(info.morphed_node_count, 1u);
+  EXPECT_EQ(info.morphed_nodes[0], 1u);
+  EXPECT_EQ(info.weight_counts[0], 4u);
   expectError(dermis_sample_weights(bank, &layer, 1, 1, weights.data(), 3, &error),
               "there are 3 weights, but node 1 has 4");
   expectError(dermis_sample_weights(bank, &layer, 1, 1, nullptr, 4, &error), "weights is null");

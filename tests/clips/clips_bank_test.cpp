@@ -123,7 +123,9 @@ TEST_F(ClipsBank, ComesBackAsItWas) {
     EXPECT_EQ(result->error(node).rotation, bank().error(node).rotation);
     EXPECT_EQ(result->error(node).scale, bank().error(node).scale);
     EXPECT_EQ(result->error(node).weight, bank().error(node).weight);
-    EXPECT_EQ(result->weightCount(node), node == arm::stand || node == arm::hand ? 4u : 0u);
+    const bool isMorphed = node == arm::stand || node == arm::hand;
+    EXPECT_EQ(result->weightCount(node), isMorphed ? 4u : 0u);
+    EXPECT_EQ(std::ranges::count(result->morphedNodes(), node), isMorphed ? 1 : 0);
   }
   const std::array<ClipLayer, 2> layers{ClipLayer{.clip = 0, .time = 0.7, .mask = 2},
                                         ClipLayer{.clip = 1, .time = 0.2, .weight = 0.5f}};

@@ -183,6 +183,8 @@ class DERMIS_CORE_API PackedClips {
   std::uint32_t jointCount(std::uint32_t skin) const;
   /// What is known of a clip. If there is none with this number, a clip of duration 0.
   ClipInfo clip(std::uint32_t clip) const;
+  /// The nodes of the skeleton with morph weights, in ascending order.
+  std::vector<std::uint32_t> morphedNodes() const;
   /// The number of morph weights of a node of the skeleton, as packed. 0 if there is none.
   std::uint32_t weightCount(std::uint32_t node) const;
   /// The error of a node of the skeleton. 0 where no clip moves it, and if there is none. The

@@ -1118,6 +1118,10 @@ typedef struct dermis_bank_info {
   double worst_error;             // of the poses; 0 if the bank was loaded from bytes
   const char* worst;              // where: clip, node and time
   uint32_t has_root_motion;       // whether it was taken out of the clips
+  // The nodes of the skeleton with morph weights, and how many each has.
+  uint32_t morphed_node_count;
+  const uint32_t* morphed_nodes;
+  const uint32_t* weight_counts;
 } dermis_bank_info;
 // Says what is known of a bank.
 DERMIS_C_API dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info,

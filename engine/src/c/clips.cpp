@@ -11,19 +11,21 @@ using namespace dermis::c;
 
 struct dermis_bank : Object {
   explicit dermis_bank(PackedClips packed, PackClipsReport of = {})
-      : clips(std::move(packed)), report(std::move(of)) {
+      : clips(std::move(packed)), report(std::move(of)), morphedNodes(clips.morphedNodes()) {
     for (std::uint32_t skin = 0; skin < clips.skinCount(); ++skin)
       jointCounts.push_back(clips.jointCount(skin));
     for (std::uint32_t i = 0; i < clips.clipCount(); ++i) {
       const ClipInfo info = clips.clip(i);
       infos.push_back({info.duration, info.wraps ? 0u : 1u, info.additive ? 1u : 0u});
     }
+    for (const std::uint32_t node : morphedNodes) weightCounts.push_back(clips.weightCount(node));
   }
 
   PackedClips clips;
   PackClipsReport report;
   std::vector<std::uint32_t> jointCounts;
   std::vector<dermis_clip_info> infos;
+  std::vector<std::uint32_t> morphedNodes, weightCounts;
 };
 
 namespace {
@@ -211,6 +213,9 @@ dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info
     result.worst_error = known.report.worstError;
     result.worst = known.report.worst.c_str();
     result.has_root_motion = known.clips.hasRootMotion() ? 1 : 0;
+    result.morphed_node_count = static_cast<std::uint32_t>(known.morphedNodes.size());
+    result.morphed_nodes = known.morphedNodes.data();
+    result.weight_counts = known.weightCounts.data();
     give(info, result);
   });
 }

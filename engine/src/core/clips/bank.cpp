@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dermis/clips.h"
 #include "pack/check.h"
@@ -196,6 +197,14 @@ ClipInfo PackedClips::clip(std::uint32_t number) const {
   if (number >= bank.header.clipCount) return {};
   const BankClip clip = bank.clip(number);
   return {clip.duration, (clip.flags & 1) != 0, (clip.flags & 2) != 0};
+}
+
+std::vector<std::uint32_t> PackedClips::morphedNodes() const {
+  const ClipBank bank(*this);
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < bank.header.morphedCount; ++i)
+    nodes.push_back(bank.morphed(i).source);
+  return nodes;
 }
 
 std::uint32_t PackedClips::weightCount(std::uint32_t node) const {
