@@ -48,6 +48,16 @@ std::string percent(const std::optional<double>& share) {
   return share ? fmt::format("{:.3f} %", *share * 100) : "-";
 }
 
+std::string counted(std::uint32_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// "3 joints and 2 morph weights"
+std::string drivenBy(const ComparedRigs& rigs) {
+  return fmt::format("{} and {}", counted(rigs.drivenJoints, "joint"),
+                     counted(rigs.drivenWeights, "morph weight"));
+}
+
 std::string_view clockName(Clock clock) {
   switch (clock) {
     case Clock::timestamps:
@@ -73,6 +83,13 @@ void printTitle(const ComparisonTitle& title, const MethodComparison& comparison
   fmt::print("model    {}, {}\n", samples::oneLine(title.model), samples::oneLine(title.pose));
   fmt::print("         {} vertices, {} joints{}\n", comparison.vertices, comparison.joints,
              comparison.scales ? ", some of which scale or shear" : "");
+  if (const ComparedRigs& rigs = comparison.rigs; rigs.drivenJoints + rigs.drivenWeights != 0) {
+    fmt::print("rig      drives {}\n", drivenBy(rigs));
+    if (rigs.secondsPerPose) {
+      fmt::print("         a pose takes {:.2f} µs on one thread of the CPU\n",
+                 *rigs.secondsPerPose * 1e6);
+    }
+  }
   if (comparison.clock == Clock::none) {
     fmt::print("timed    nothing: the reference is not optimized for speed\n");
     return;
@@ -191,6 +208,10 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
   json["methods"] = Json::array();
   for (const ComparedMethod& compared : comparison.methods)
     json["methods"].push_back(describe(compared));
+  const ComparedRigs& rigs = comparison.rigs;
+  json["rigs"] = {{"drivenJoints", rigs.drivenJoints},
+                  {"drivenWeights", rigs.drivenWeights},
+                  {"secondsPerPose", optionalNumber(rigs.secondsPerPose)}};
   const CurvedComparison& curved = comparison.curved;
   Json& ofCurved = json["curved"];
   ofCurved["segments"] = tubeSegments;
@@ -205,11 +226,12 @@ Result<void> writeJsonComparison(const std::filesystem::path& path, const Compar
 
 /// The subject: a model in a pose, or the built-in arm.
 struct ComparisonSubject {
-  std::optional<BuiltInScenes> builtIn;  ///< if a picture is drawn
+  std::optional<BuiltInScenes> builtIn;  ///< if a picture is drawn, unless the model has a rig
   std::optional<Scene> model;            ///< empty: the built-in arm
+  std::optional<Scene> withoutRig;       ///< the model, if it has one and a picture is drawn
   std::string name;                      ///< of the model, as requested
   std::string poseName;                  ///< "rest pose", "clip 0 'walk' at 0.341 s"
-  ScenePose pose;
+  ScenePose pose, poseWithoutRig;
 
   const Scene& scene() const { return model ? *model : builtIn->arm; }
 };
@@ -218,10 +240,6 @@ struct ComparisonSubject {
 constexpr std::array usualMethods{Method::linear,         Method::quaternionTranslation,
                                   Method::logMatrix,      Method::sphericalBlend,
                                   Method::dualQuaternion, Method::centerOfRotation};
-
-std::string counted(std::uint32_t count, const char* what) {
-  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-}
 
 /// Formats with three digits and no exponent.
 std::string nanoseconds(double value) {
@@ -237,32 +255,50 @@ std::vector<std::string> costOf(const MethodComparison& comparison, Method metho
           nanoseconds(*compared->seconds / vertices * 1e9)};
 }
 
-/// The default columns of a picture: those of the usual methods that the scene allows.
-std::vector<Method> usualColumns(const Scene& scene) {
+bool allows(const ComparisonSubject& subject, Method method) {
+  return allows(subject.scene(), method) &&
+         (!subject.withoutRig || allows(*subject.withoutRig, method));
+}
+
+/// The default columns of a picture: those of the usual methods that the subject allows.
+std::vector<Method> usualColumns(const ComparisonSubject& subject) {
   std::vector<Method> columns;
   std::ranges::copy_if(usualMethods, std::back_inserter(columns),
-                       [&scene](Method method) { return allows(scene, method); });
+                       [&subject](Method method) { return allows(subject, method); });
   return columns;
 }
 
-/// Describes the picture of a subject with built-in scenes: these first, then the model with the
-/// cost of skinning it, and the heat map. Refers to the subject.
+ComparisonStrip stripOf(const ComparisonSubject& subject, const Scene& scene,
+                        const ScenePose& pose) {
+  ComparisonStrip strip;
+  strip.scene = &scene;
+  strip.pose = pose;
+  strip.title = samples::oneLine(std::filesystem::path(subject.name).filename().string());
+  strip.remark = samples::oneLine(subject.poseName);
+  return strip;
+}
+
+/// Describes the picture of a subject: built-in scenes first, then the model with the cost of
+/// skinning it, and the heat map; or a model without and with its rig. Refers to the subject.
 ComparisonSheet describeSheet(const ComparisonSubject& subject, const std::vector<Method>& columns,
                               const ComparisonTitle& title, const MethodComparison& comparison) {
   ComparisonSheet sheet;
   for (const Method method : columns) sheet.columns.push_back({method, costOf(comparison, method)});
-  sheet.strips = builtInStrips(*subject.builtIn);
-  if (subject.model) {
-    ComparisonStrip& strip = sheet.strips.emplace_back();
-    strip.scene = &*subject.model;
-    strip.pose = subject.pose;
-    strip.title = samples::oneLine(std::filesystem::path(subject.name).filename().string());
-    strip.remark = samples::oneLine(subject.poseName) + "; skinning time";
+  if (subject.withoutRig) {
+    sheet.strips = {stripOf(subject, *subject.withoutRig, subject.poseWithoutRig),
+                    stripOf(subject, *subject.model, subject.pose)};
+    sheet.strips[0].title += " without its rig";
+    sheet.strips[1].title += " with its rig";
+    sheet.strips[1].remark = "drives " + drivenBy(comparison.rigs);
+    if (const auto& seconds = comparison.rigs.secondsPerPose)
+      sheet.strips[1].remark += fmt::format("; {:.2f} µs per pose", *seconds * 1e6);
   } else {
+    sheet.strips = builtInStrips(*subject.builtIn);
+    if (subject.model) sheet.strips.push_back(stripOf(subject, *subject.model, subject.pose));
     sheet.strips.back().remark += "; skinning time";
+    sheet.strips.back().hasHeatMap = true;
   }
   sheet.strips.back().showsCost = true;
-  sheet.strips.back().hasHeatMap = true;
   sheet.footer = samples::oneLine(fmt::format(
       "Time: median of {}, {} of {} vertices, {}", counted(comparison.repetitions, "run"),
       counted(comparison.instances, "instance"), comparison.vertices, title.device));
@@ -369,6 +405,13 @@ ExitStatus loadModel(const CompareOptions& options, ComparisonSubject& subject) 
   }
   const Result<std::uint32_t> clip = chooseClip(*scene, options.animation);
   if (!clip) return reportWrongUsage(clip.error().message);
+  if (!scene->rigs.empty() && !options.output.empty()) {
+    preparation.rig = "none";
+    Result<Scene> without = loadScene(samples::pathOf(options.model), preparation);
+    if (!without) return reportModelError(without.error());
+    subject.poseWithoutRig = scenePose(*without, *clip, options.time);
+    subject.withoutRig.emplace(std::move(*without));
+  }
   subject.name = options.model;
   subject.poseName = poseName(*scene->model, *clip, options.time);
   subject.pose = scenePose(*scene, *clip, options.time);
@@ -381,7 +424,7 @@ ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject
     if (const ExitStatus loaded = loadModel(options, subject); loaded != ExitStatus::done)
       return loaded;
   }
-  if (options.output.empty()) return ExitStatus::done;
+  if (options.output.empty() || subject.withoutRig) return ExitStatus::done;
   Result<BuiltInScenes> builtIn = loadBuiltInScenes(preparationFor(options));
   if (!builtIn) return reportModelError(builtIn.error());
   subject.builtIn.emplace(std::move(*builtIn));
@@ -394,17 +437,18 @@ ExitStatus loadSubject(const CompareOptions& options, ComparisonSubject& subject
 }
 
 /// The methods for the columns of the picture, in order.
-Result<std::vector<Method>> chooseColumns(const CompareOptions& options, const Scene& scene) {
+Result<std::vector<Method>> chooseColumns(const CompareOptions& options,
+                                          const ComparisonSubject& subject) {
   std::vector<Method> columns;
   for (const std::string& name : options.methods) {
     columns.push_back(*methodFromName(name));
-    if (allows(scene, columns.back())) continue;
+    if (allows(subject, columns.back())) continue;
     return Error{
         ErrorCode::invalidArgument,
         fmt::format("{}: {} needs centers of rotation, which would take too long to compute",
                     options.model, name)};
   }
-  return columns.empty() ? usualColumns(scene) : columns;
+  return columns.empty() ? usualColumns(subject) : columns;
 }
 
 ExitStatus writePicture(const CompareOptions& options, const ComparisonSubject& subject,
@@ -446,7 +490,7 @@ ExitStatus compare(const CompareOptions& options) {
       kept != ExitStatus::done) {
     return kept;
   }
-  const Result<std::vector<Method>> columns = chooseColumns(options, subject.scene());
+  const Result<std::vector<Method>> columns = chooseColumns(options, subject);
   if (!columns) return reportWrongUsage(columns.error().message);
   if (options.width < columns->size() * leastColumnWidth) {
     return reportWrongUsage(
@@ -503,7 +547,7 @@ Run addCompare(CLI::App& app) {
   CLI::Option* output = command->add_option(
       "-o,--output", options->output,
       "Draw the methods side by side, with a twisted bar, a bent arm and a heat map of the "
-      "difference: OUT.png");
+      "difference, or a model without and with its rig: OUT.png");
   command
       ->add_option("--methods", options->methods,
                    "Methods for the columns of the picture, separated by commas [linear, "

@@ -141,8 +141,9 @@ class MethodComparer {
   Result<MethodComparison> compare(const ComparisonTimer& timer) {
     if (Result<void> done = compareShapes(); !done) return done.error();
     if (Result<void> done = compareOnModel(); !done) return done.error();
-    if (Result<void> done = compareCurved(timer.isCpu || timer.device != nullptr); !done)
-      return done.error();
+    const bool isTimed = timer.isCpu || timer.device != nullptr;
+    if (Result<void> done = compareRigs(isTimed); !done) return done.error();
+    if (Result<void> done = compareCurved(isTimed); !done) return done.error();
     if (timer.isCpu) {
       if (Result<void> done = timeOnCpu(); !done) return done.error();
     }
@@ -251,28 +252,52 @@ class MethodComparer {
     return *seconds / static_cast<double>(copies * packed.vertexCount());
   }
 
+  /// Evaluates a rig. Given weights are 0.
+  Result<double> secondsPerPose(const PackedRig& rig, std::span<const JointMatrix> written) const {
+    constexpr int poses = 1000;
+    std::vector<JointMatrix> driven(rig.drivenJoints());
+    const std::vector<float> given(rig.givenWeights());
+    std::vector<float> weights(given.size() + rig.drivenWeights());
+    const Result<double> seconds = secondsOf([&]() -> Result<void> {
+      for (int i = 0; i < poses; ++i) {
+        if (Result<void> done = evaluateRig(rig, written, given, driven, weights); !done)
+          return done;
+      }
+      return {};
+    });
+    if (!seconds) return seconds;
+    return *seconds / poses;
+  }
+
+  Result<void> compareRigs(bool isTimed) {
+    ComparedRigs& rigs = comparison_.rigs;
+    for (const auto& [skin, rig] : scene_.rigs) {
+      rigs.drivenJoints += rig.packed.drivenJoints();
+      rigs.drivenWeights += rig.packed.drivenWeights();
+      if (!isTimed || pose_.poses[skin].empty()) continue;
+      const Result<double> seconds = secondsPerPose(
+          rig.packed, std::span(pose_.poses[skin]).first(rig.packed.writtenJoints()));
+      if (!seconds) return seconds.error();
+      rigs.secondsPerPose = rigs.secondsPerPose.value_or(0) + *seconds;
+    }
+    return {};
+  }
+
   Result<void> compareCurved(bool isTimed) {
     const Result<CurvedTube> tube = makeCurvedTube();
     if (!tube) return tube.error();
     CurvedComparison& curved = comparison_.curved;
     curved.tube = tube->shape;
     if (!isTimed) return {};
-    constexpr int poses = 1000;
-    std::vector<JointMatrix> pose(3 + tube->rig.drivenJoints());
-    const Result<double> perPose = secondsOf([&]() -> Result<void> {
-      for (int i = 0; i < poses; ++i) {
-        const Result<void> done =
-            evaluateRig(tube->rig, std::span(pose).first(3), {}, std::span(pose).subspan(3), {});
-        if (!done) return done;
-      }
-      return {};
-    });
+    std::vector<JointMatrix> pose(3);
+    const Result<double> perPose = secondsPerPose(tube->rig, pose);
     if (!perPose) return perPose.error();
+    pose.resize(3 + tube->rig.drivenJoints());
     const Result<double> perVertex = secondsPerVertex(tube->mesh, pose);
     if (!perVertex) return perVertex.error();
     const Result<double> straight = secondsPerVertex(tube->straight, std::span(pose).first(2));
     if (!straight) return straight.error();
-    curved.secondsPerPose = *perPose / poses;
+    curved.secondsPerPose = *perPose;
     curved.secondsPerVertex = *perVertex;
     curved.secondsPerStraight = *straight;
     return {};

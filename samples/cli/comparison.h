@@ -40,6 +40,12 @@ struct CurvedComparison {
   std::optional<double> secondsPerStraight;  ///< the same without the chain
 };
 
+/// What the rigs of a model compute.
+struct ComparedRigs {
+  std::uint32_t drivenJoints = 0, drivenWeights = 0;
+  std::optional<double> secondsPerPose;  ///< of all, on one thread of the CPU; empty if not timed
+};
+
 struct MethodComparison {
   std::uint32_t instances = 0;
   std::uint64_t vertices = 0;  ///< of one instance
@@ -49,6 +55,7 @@ struct MethodComparison {
   Clock clock = Clock::none;
   InstructionSource instructionSource = InstructionSource::spirv;
   std::vector<ComparedMethod> methods;  ///< in the order of `allMethods`
+  ComparedRigs rigs;
   CurvedComparison curved;
 };
 

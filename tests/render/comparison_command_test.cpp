@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -83,6 +88,56 @@ TEST(ComparisonCommandTest, EveryMethodHasARowAndThePictureTheColumnsThatAreName
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->width, 500u);
   EXPECT_GT(picture->height, 500u);
+}
+
+/// The rows of the pictures in a sheet, from the first one to behind the last one.
+std::vector<std::array<std::uint32_t, 2>> stripsIn(const samples::render::Picture& sheet) {
+  std::vector<std::array<std::uint32_t, 2>> strips;
+  const auto isPaper = [&sheet](std::uint32_t row) {
+    const std::uint8_t* const pixel = &sheet.pixels[(std::size_t{row} * sheet.width + 30) * 4];
+    return std::equal(pixel, pixel + 4, sheet.pixels.begin());
+  };
+  for (std::uint32_t row = 0, first = 0; row < sheet.height; ++row) {
+    if (!isPaper(row)) continue;
+    if (row - first > 60) strips.push_back({first, row});
+    first = row + 1;
+  }
+  return strips;
+}
+
+// The twist of the hand is at the wrist without the rig.
+TEST(ComparisonCommandTest, AModelIsDrawnWithoutAndWithItsRig) {
+  REQUIRE_DEVICE();
+  const std::string out = outFile("rigged.png"), json = outFile("rigged.json");
+  const CommandResult result =
+      compare({std::string(sampleModels) + "/rigged_arm.glb", "--animation", "twist", "--time", "1",
+               "--instances", "1", "--repetitions", "1", "-o", out, "--json", json, "--width",
+               "480", "--methods", "linear"});
+  ASSERT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(
+      result.output.find("\nrig      drives 3 joints and 2 morph weights\n         a pose takes "),
+      std::string::npos)
+      << result.output;
+  const nlohmann::json rigs = nlohmann::json::parse(std::ifstream(json)).at("rigs");
+  EXPECT_EQ(rigs.at("drivenJoints"), 3);
+  EXPECT_EQ(rigs.at("drivenWeights"), 2);
+  EXPECT_GT(rigs.at("secondsPerPose").get<double>(), 0);
+
+  const auto picture = readPng(out);
+  ASSERT_TRUE(picture);
+  const std::vector<std::array<std::uint32_t, 2>> strips = stripsIn(*picture);
+  ASSERT_EQ(strips.size(), 2u);
+  std::array<std::vector<std::uint8_t>, 2> rows;
+  for (std::size_t strip = 0; strip < 2; ++strip) {
+    const auto at = [&](std::uint32_t row) {
+      return picture->pixels.begin() + std::ptrdiff_t{row} * picture->width * 4;
+    };
+    rows[strip].assign(at(strips[strip][0]), at(strips[strip][1]));
+  }
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < std::min(rows[0].size(), rows[1].size()); i += 4)
+    differing += std::abs(int{rows[0][i]} - int{rows[1][i]}) > 24 ? 1u : 0u;
+  EXPECT_GT(differing, 200u);
 }
 
 TEST(ComparisonCommandTest, WhatIsWrongHasItsStatus) {
