@@ -80,14 +80,15 @@ sanitized() {
   [ -f build/ci/CMakeCache.txt ] || cmake --preset ci >build/ci.log
   cmake --build build/ci --target dermis_kernels
   build_and_test build/sanitized "-L sanitized" asan -DDERMIS_SANITIZE_TESTS=OFF -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=ON \
-    -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels"
+    -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels" -DDERMIS_QUICK_OPTIMIZATION=-O0
 }
 
 step "install" ./cmake/install-deps.sh
 outcome=0
 case $run in
   all)
-    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON -DCMAKE_UNITY_BUILD=ON || outcome=$?
+    build_and_test build/ci "$every_change" ci -DDERMIS_SANITIZED_TESTS_ELSEWHERE=ON -DCMAKE_UNITY_BUILD=ON \
+      -DDERMIS_QUICK_OPTIMIZATION=-O1 || outcome=$?
     sanitized || outcome=$?
     ;;
   sanitized) sanitized || outcome=$? ;;
