@@ -369,6 +369,29 @@ TEST(ReferenceMethods, SphericalBlendOfACommonAxisIsFinite) {
   }
 }
 
+// Its influence on the center does not depend on its weight. `pack` drops it or not.
+TEST(ReferenceMethods, SphericalBlendHasNoBoundForWeightsThatPackingMayDrop) {
+  const std::array pose{jointOf(rotationAbout({0, 0, 1}, 1), {1, 0, 0}),
+                        jointOf(rotationAbout({0, 1, 0}, 2), {0, 0, 1})};
+  for (const float weight : {0x1p-50f, 0x1p-48f, 0x1p-26f, 0x1.fp-25f, 0x1p-24f}) {
+    OwnedMesh mesh;
+    addVertex(mesh, {1, 2, 3}, {{0, 1 - weight}, {1, weight}});
+    const bool isKept = weight >= 0x1p-24f;
+    const bool isDropped = weight < 0x1p-49f;
+    const auto packed = pack(mesh.view(), 2);
+    ASSERT_TRUE(packed.ok());
+    if (isDropped || isKept) {
+      EXPECT_EQ(packed->info().requiredJoints, isKept ? 2u : 1u) << weight;
+    }
+    for (const Method method : {Method::sphericalBlend, Method::dualQuaternion}) {
+      const reference::AnalyzedMesh result = skinned(mesh, pose, method);
+      EXPECT_EQ(result.conditioning[0].signAmbiguous,
+                method == Method::sphericalBlend && !isKept && !isDropped)
+          << weight;
+    }
+  }
+}
+
 // No center is better than another: it stays where it is, at 0.
 TEST(ReferenceMethods, SphericalBlendOfEqualRotationsIsLinear) {
   RigRandom random(18);

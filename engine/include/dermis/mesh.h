@@ -394,7 +394,7 @@ class DERMIS_CORE_API PackedMesh {
 /// - Attributes are converted to float32.
 /// - The weights of a joint that occurs twice in a vertex are added. Zero weights are dropped.
 /// - Weights are normalized in double precision, and rounded to float32 so that they sum to exactly
-///   1. A weight below 2^-49 is dropped.
+///   1. A weight below 2^-49 is dropped. Rounding the sum to 1 may drop one below 2^-24.
 /// - The influences of a vertex are sorted by descending weight, and by ascending joint index if
 ///   weights are equal. The first is the pivot: the quaternions of the others are brought into its
 ///   hemisphere before they are blended (docs/methods.md).

@@ -144,8 +144,9 @@ namespace {
 
 /// In directions in which rotations differ by less, the center stays at 0.
 constexpr double leastSingularValue = 1e-3;
-/// Packing drops smaller weights.
-constexpr double leastWeight = 0x1p-49;
+/// Packing drops weights below the first. Those below the second it may drop: the sum of all is
+/// rounded to 1, for which the strongest weight is off by 2^-25 at most.
+constexpr double leastWeight = 0x1p-49, leastKeptWeight = 0x1p-24;
 
 }  // namespace
 
@@ -157,6 +158,7 @@ dvec3 sphericalCenter(const VertexToSkin& vertex, Conditioning& conditioning) {
   std::vector<Turned> joints;
   for (const Influence& influence : vertex.influences) {
     if (influence.weight < leastWeight) continue;
+    conditioning.signAmbiguous |= influence.weight < leastKeptWeight;
     const Joint& joint = vertex.joints[influence.joint];
     joints.push_back({matrixOf(joint.rigid.real), joint.translation});
   }
