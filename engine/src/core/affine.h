@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <optional>
 
 namespace dermis {
 
@@ -34,6 +36,29 @@ Affine<T> multiply(const Affine<T>& left, const Right& right) {
     }
   }
   return product;
+}
+
+/// None if the determinant is 0 beside the lengths of the rows.
+inline std::optional<Affine<double>> inverseOf(const Affine<double>& m) {
+  Affine<double> inverse;
+  double determinant = 0, size = 1;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const std::size_t a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+      inverse[i][j] = m[a][c] * m[b][d] - m[a][d] * m[b][c];
+    }
+    determinant += m[0][i] * inverse[i][0];
+    size *= std::sqrt(m[i][0] * m[i][0] + m[i][1] * m[i][1] + m[i][2] * m[i][2]);
+  }
+  if (!(std::abs(determinant) > 1e-9 * size)) return std::nullopt;
+  for (auto& row : inverse) {
+    row[3] = 0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      row[j] /= determinant;
+      row[3] -= row[j] * m[j][3];
+    }
+  }
+  return inverse;
 }
 
 }  // namespace dermis

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -73,32 +74,19 @@ std::uint32_t numberFrom(const std::string& name) {
 }
 
 /// The inverse, or zeros if there is none; `packRig` refuses a driver that reads that.
-JointMatrix inverseOf(const JointMatrix& matrix) {
-  const auto at = [&](std::size_t row, std::size_t column) {
-    return double{matrix.m[row][column]};
-  };
-  double adjugate[3][3], determinant = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      const std::size_t a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-      adjugate[i][j] = at(a, c) * at(b, d) - at(a, d) * at(b, c);
+JointMatrix inverseOrZero(const JointMatrix& matrix) {
+  Affine<double> numbers;
+  for (std::size_t row = 0; row < 3; ++row) std::ranges::copy(matrix.m[row], numbers[row].begin());
+  const std::optional<Affine<double>> found = inverseOf(numbers);
+  constexpr JointMatrix zero{.m = {}};
+  if (!found) return zero;
+  JointMatrix inverse;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      inverse.m[row][column] = static_cast<float>((*found)[row][column]);
+      if (!std::isfinite(inverse.m[row][column])) return zero;
     }
   }
-  for (std::size_t i = 0; i < 3; ++i) determinant += at(0, i) * adjugate[i][0];
-  JointMatrix inverse{};
-  bool isFinite = true;
-  for (std::size_t i = 0; i < 3; ++i) {
-    double shift = 0;
-    for (std::size_t j = 0; j < 3; ++j) {
-      const double number = adjugate[i][j] / determinant;
-      inverse.m[i][j] = static_cast<float>(number);
-      shift -= number * at(j, 3);
-    }
-    inverse.m[i][3] = static_cast<float>(shift);
-    for (const float number : inverse.m[i]) isFinite = isFinite && std::isfinite(number);
-  }
-  if (!isFinite)
-    for (auto& row : inverse.m) std::ranges::fill(row, 0.0f);
   return inverse;
 }
 
@@ -336,7 +324,7 @@ class RigReader {
     rig_.joints.resize(count + ofChains_);
     for (std::uint32_t joint = 0; joint < count; ++joint)
       rig_.joints[rig_.places[joint]] = {above[skin_.joints[joint]],
-                                         inverseOf(skin_.inverseBindMatrices[joint])};
+                                         inverseOrZero(skin_.inverseBindMatrices[joint])};
 
     for (std::vector<std::uint32_t>& list : rig_.jointLists)
       for (std::uint32_t& joint : list) joint = rig_.places[joint];

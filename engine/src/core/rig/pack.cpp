@@ -48,26 +48,6 @@ Vec3 rowOf(const Matrix& m, std::size_t row) {
   return {m[row][0], m[row][1], m[row][2]};
 }
 
-/// None if the determinant is 0 beside the lengths of the rows.
-std::optional<Matrix> inverseOf(const Matrix& m) {
-  const Vec3 rows[3] = {rowOf(m, 0), rowOf(m, 1), rowOf(m, 2)};
-  const Vec3 columns[3] = {math::cross(rows[1], rows[2]), math::cross(rows[2], rows[0]),
-                           math::cross(rows[0], rows[1])};
-  const double determinant = math::dot(rows[0], columns[0]);
-  const double size = math::length(rows[0]) * math::length(rows[1]) * math::length(rows[2]);
-  if (!(std::abs(determinant) > 1e-9 * size)) return {};
-  Matrix inverse;
-  for (std::size_t i = 0; i < 3; ++i) {
-    double shift = 0;
-    for (std::size_t j = 0; j < 3; ++j) {
-      inverse[i][j] = columns[j][i] / determinant;
-      shift -= inverse[i][j] * m[j][3];
-    }
-    inverse[i][3] = shift;
-  }
-  return inverse;
-}
-
 /// The orthonormal columns that follow from those of a matrix by the method of Gram and Schmidt.
 std::array<Vec3, 3> orthonormalColumns(const Matrix& m) {
   const auto column = [&](std::size_t i) { return Vec3(m[0][i], m[1][i], m[2][i]); };
