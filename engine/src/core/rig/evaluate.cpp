@@ -1,7 +1,9 @@
 // Computes what a rig drives, for one pose.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -74,10 +76,14 @@ Result<void> evaluateRig(const PackedRig& rig, std::span<const JointMatrix> writ
                      "weights in all");
   if (!good) return good;
   std::ranges::copy(givenWeights, weights.begin());
-  std::vector<rigs::Quat<float>> rotations(header.mostInputs);
-  std::vector<float> basis(maxRigExamples);
+  std::array<float, maxRigExamples> basis{};
+  // Most correctives read one joint, which needs no memory.
+  rigs::Quat<float> one{};
+  std::vector<rigs::Quat<float>> many(header.mostInputs > 1 ? header.mostInputs : 0);
+  const std::span<rigs::Quat<float>> rotations =
+      many.empty() ? std::span(&one, header.mostInputs) : std::span(many);
   rigs::PoseMemory memory{written, driven, weights};
-  rigs::evaluateDrivers<float>(blob, rotations, basis, memory);
+  rigs::evaluateDrivers<float>(blob, rotations, std::span<float>(basis), memory);
   return {};
 }
 
