@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <map>
 #include <string_view>
+#include <system_error>
 #include <tuple>
 #include <utility>
 
@@ -55,10 +57,12 @@ struct SetName {
 SetName setName(std::string_view name, std::string_view prefix) {
   if (!name.starts_with(prefix)) return {};
   const std::string_view digits = name.substr(prefix.size());
-  const bool decimal = !digits.empty() && digits.size() <= 6 &&
-                       digits.find_first_not_of("0123456789") == std::string_view::npos &&
-                       (digits.size() == 1 || digits[0] != '0');
-  return {true, decimal ? static_cast<std::uint32_t>(std::stoul(std::string(digits))) : none};
+  std::uint32_t number = none;
+  const char* const end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, number);
+  const bool isDecimal = error == std::errc() && stop == end && digits.size() <= 6 &&
+                         (digits.size() == 1 || digits[0] != '0');
+  return {true, isDecimal ? number : none};
 }
 
 int findAttribute(const std::map<std::string, int>& attributes, const std::string& name) {

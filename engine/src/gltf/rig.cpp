@@ -2,11 +2,13 @@
 #include "gltf/rig.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "core/affine.h"
@@ -68,9 +70,10 @@ std::string readName(json& value, const std::string& what) {
 }
 
 std::uint32_t numberFrom(const std::string& name) {
-  const bool isNumber =
-      !name.empty() && name.size() <= 9 && name.find_first_not_of("0123456789") == name.npos;
-  return isNumber ? static_cast<std::uint32_t>(std::stoul(name)) : none;
+  std::uint32_t number = none;
+  const char* const end = name.data() + name.size();
+  const auto [stop, error] = std::from_chars(name.data(), end, number);
+  return error == std::errc() && stop == end ? number : none;
 }
 
 /// The inverse, or zeros if there is none; `packRig` refuses a driver that reads that.
