@@ -258,11 +258,16 @@ TEST(GltfRig, EachMistakeHasASentence) {
   expectMistake("[]", "the rig is not an object");
   expectMistake("{}", "the rig: it has no drivers");
   expectMistake(R"({"drivers": 1})", "drivers is not an array");
-  expectMistake(R"({"drivers": [], "weights": []})", "there is no member 'weights'");
+  expectMistake(R"({"drivers": [], "weights": []})",
+                "the rig: the member 'weights' is unknown; known are drivers");
   expectMistake("{\"drivers\": [", "the JSON text is invalid at byte 14");
+  expectMistake("{\n\"drivers\":\n  [,]}", "the JSON text is invalid in line 3, column 4");
+  expectMistake("{\n\"drivers: [\n]}", "the JSON text is invalid in line 2, column 12");
   const std::vector<std::pair<std::string, std::string>> drivers = {
       {"7", "driver 0 is not an object"},
       {"{}", "driver 0: it has none of twist, corrective, chain, linear"},
+      {R"({"aim": 1, "axis": []})",
+       "driver 0: it has none of twist, corrective, chain, linear, but 'aim'"},
       {twist + ", {\"twist\": 3}", "driver 1: it has no source"},
       {R"({"twist": "wrist", "source": 0, "axis": [1, 0, 0]})",
        "driver 0: twist: the skin has no joint 'wrist'"},
@@ -272,9 +277,10 @@ TEST(GltfRig, EachMistakeHasASentence) {
       {R"({"twist": 1, "source": 3, "axis": [1, 0]})", "axis is not an array of 3 numbers"},
       {R"({"twist": 1, "source": 3, "axis": [0, 0, 0]})", "driver 0: axis is 0"},
       {R"({"twist": 1, "source": 3, "axis": [1e39, 0, 0]})", "out of range for float32"},
-      {R"({"twist": 1, "source": 3, "axis": [1, 0, 0], "share": 2})", "share is not from -1 to 1"},
+      {R"({"twist": 1, "source": 3, "axis": [1, 0, 0], "share": 2})",
+       "share is 2, which is not from -1 to 1"},
       {R"({"twist": 1, "source": 3, "axis": [1, 0, 0], "shares": 1})",
-       "there is no member 'shares'"},
+       "driver 0: the member 'shares' is unknown; known are axis, share, source, twist"},
       {twist + "," + twist, "driver 1: driver 0 drives the joint 'twist', too"},
       {R"({"twist": "twist", "source": "twist", "axis": [1, 0, 0]})",
        "driver 0 is part of, or reads, a cycle of drivers"},
@@ -285,19 +291,23 @@ TEST(GltfRig, EachMistakeHasASentence) {
       {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"x": 1}}]})",
        "driver 0: no mesh of the skin has the morph target 'x'"},
       {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"bent": "1"}}]})",
-       "example 0: a weight is not an array of 1 numbers"},
+       "example 0: the weight 'bent' is not a number"},
+      {R"({"corrective": ["lower"], "radius": -1, "examples": []})",
+       "driver 0: radius is -1, which is negative"},
       {corrective + R"([{"rotations": [[0, 0, 0, 1]], "joints": {"twist": {"turn": 1}}}]})",
-       "example 0: joint 'twist': there is no member 'turn'"},
+       "example 0: joint 'twist': the member 'turn' is unknown; known are rotation, scale, "
+       "translation"},
       {corrective + R"([{"rotations": [[0, 0, 0, 1]]}]})", "driver 0 drives nothing"},
       {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"bent": 1}},
                         {"rotations": [[0, 0, 0, -1]], "weights": {"bent": 0}}]})",
        "driver 0"},
       {R"({"chain": ["hand"], "segments": 2})", "chain lists less than two joints"},
-      {R"({"chain": ["hand", "lower"], "segments": 1})", "segments is 1, which is not from 2"},
-      {R"({"chain": ["hand", "lower"], "segments": 2.5})", "segments is not an integer"},
-      {R"({"chain": ["hand", "hand"], "segments": 2})",
-       "driver 0: the joint 'hand' and the joint 'hand' are at one place in bind pose"},
-      {R"({"chain": ["hand", "lower"], "segments": 65534})", "the rig has 65538 joints"},
+      {R"({"chain": ["lower", "hand"], "segments": 1})", "segments is 1, which is not from 2"},
+      {R"({"chain": ["lower", "hand"], "segments": 2.5})", "segments is not an integer"},
+      {R"({"chain": ["hand", "hand"], "segments": 2})", "chain lists the joint 'hand' twice"},
+      {R"({"chain": ["hand", "lower"], "segments": 2})",
+       "chain: the joint 'lower' is above 'hand'; list joints from the root to the tip"},
+      {R"({"chain": ["lower", "hand"], "segments": 65534})", "the rig has 65538 joints"},
       {R"({"linear": "muscle", "terms": [{"weight": "x", "matrix": [0,0,0,0,0,0,0,0,0,0,0,0]}]})",
        "no mesh of the skin has the morph target 'x'"},
       {R"({"linear": "muscle", "terms": [{"weight": "smile", "matrix": [1]}]})",
@@ -307,6 +317,19 @@ TEST(GltfRig, EachMistakeHasASentence) {
     expectMistake("{\"drivers\": [" + text + "]}", sentence);
   gltf::Model model = loaded(arm());
   EXPECT_EQ(gltf::applyRig(model, 1, "{}").error().code, ErrorCode::invalidArgument);
+}
+
+TEST(GltfRig, NotesJointsBelowADrivenOne) {
+  gltf::Model model = loaded(arm());
+  const std::size_t before = model.notes.size();
+  ASSERT_TRUE(gltf::applyRig(model, 0, R"({"drivers": [{"twist": "lower", "source": "upper",
+                                           "axis": [1, 0, 0]}]})")
+                  .ok());
+  ASSERT_EQ(model.notes.size(), before + 1);
+  EXPECT_EQ(
+      model.notes.back(),
+      "the rig of skin 0: 'twist' and 1 other joint below the driven joint 'lower' follow the "
+      "node, not the driver");
 }
 
 TEST(GltfRig, ASingularBindMatrixIsAMistakeOnlyIfADriverReadsIt) {

@@ -358,6 +358,7 @@ DERMIS_GLTF_API Result<std::vector<std::string>> addClips(Model& model, Model fr
 ///   its last ones, in the order of the rig's weights (`InstanceDescription::drivenTargets`). Their
 ///   weights are removed from nodes and clips.
 /// - A mesh that nodes with other skins have, too, is copied, so that those stay as they are.
+/// - A written joint below a driven one, which it does not follow, is a note (`Model::notes`).
 ///
 /// Call it once for a skin, after `addClips`. Returns a view of the rig that owns what it points
 /// to; `packRig` does not fail for it. Given weights are those of the node `RigView::weightsOf`; if

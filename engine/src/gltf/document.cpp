@@ -62,7 +62,11 @@ json parseText(std::string_view text, MemoryBudget& budget) {
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    failInvalid("the JSON text is invalid at byte ", error.byte);
+    const std::string_view before = text.substr(0, std::max<std::size_t>(error.byte, 1) - 1);
+    const auto lines = std::ranges::count(before, '\n');
+    if (lines == 0) failInvalid("the JSON text is invalid at byte ", error.byte);
+    failInvalid("the JSON text is invalid in line ", lines + 1, ", column ",
+                before.size() - before.rfind('\n'));
   } catch (const json::out_of_range&) {
     failInvalid("the JSON text has a number that is too large");
   }

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/affine.h"
+#include "gltf/descendants.h"
 #include "gltf/document.h"
 #include "gltf/failure.h"
 #include "gltf/properties.h"
@@ -57,8 +58,10 @@ float readFloat(const json& object, const char* property, const std::string& whe
 void allow(const json& object, const std::set<std::string_view>& names, const std::string& where) {
   if (!object.is_object()) failInvalid(where, " is not an object");
   for (const auto& member : object.items()) {
-    if (!names.contains(member.key()))
-      failInvalid(where, ": there is no member ", inQuotes(member.key()));
+    if (names.contains(member.key())) continue;
+    std::string all;
+    for (const std::string_view name : names) all += (all.empty() ? "" : ", ") + std::string(name);
+    failInvalid(where, ": the member ", inQuotes(member.key()), " is unknown; known are ", all);
   }
 }
 
@@ -96,9 +99,14 @@ JointMatrix inverseOrZero(const JointMatrix& matrix) {
 class RigReader {
  public:
   RigReader(const Model& model, std::uint32_t skin, MemoryBudget& budget, OwnedRig& rig)
-      : model_(model), skin_(model.skins[skin]), number_(skin), budget_(budget), rig_(rig) {
+      : model_(model),
+        skin_(model.skins[skin]),
+        number_(skin),
+        budget_(budget),
+        rig_(rig),
+        descendants_(model) {
     spend(budget_, skin_.joints.size(), 256, "the joints of a rig");
-    spend(budget_, model_.nodes.size(), sizeof(std::uint32_t), "the joints of a rig");
+    spend(budget_, model_.nodes.size(), 4 * sizeof(std::uint32_t), "the joints of a rig");
     for (std::uint32_t i = 0; i < skin_.joints.size(); ++i) {
       const auto [known, isNew] = names_.emplace(model_.nodes[skin_.joints[i]].name, i);
       if (!isNew) known->second = none;
@@ -152,9 +160,12 @@ class RigReader {
   std::uint32_t drive(std::uint32_t joint) {
     const auto [other, isNew] = drivenJoints_.emplace(joint, driver_);
     if (!isNew)
-      failInvalid(where_, ": driver ", other->second, " drives the joint ",
-                  inQuotes(model_.nodes[skin_.joints[joint]].name), ", too");
+      failInvalid(where_, ": driver ", other->second, " drives the joint ", nameOf(joint), ", too");
     return joint;
+  }
+
+  std::string nameOf(std::uint32_t joint) const {
+    return inQuotes(model_.nodes[skin_.joints[joint]].name);
   }
 
   void readDriver(json& driver) {
@@ -163,7 +174,12 @@ class RigReader {
     if (driver.contains("corrective")) return readCorrective(driver);
     if (driver.contains("chain")) return readChain(driver);
     if (driver.contains("linear")) return readLinear(driver);
-    failInvalid(where_, ": it has none of twist, corrective, chain, linear");
+    const std::set<std::string_view> known{"axis",  "examples", "radius", "segments",
+                                           "share", "source",   "terms"};
+    std::string found;
+    for (const auto& member : driver.items())
+      if (found.empty() && !known.contains(member.key())) found = ", but " + inQuotes(member.key());
+    failInvalid(where_, ": it has none of twist, corrective, chain, linear", found);
   }
 
   void readTwist(json& driver) {
@@ -175,7 +191,8 @@ class RigReader {
     twist.source = jointOf(driver["source"], in("source"));
     twist.axis = readDirection<3>(require(driver, "axis", where_), in("axis"));
     twist.share = readFloat(driver, "share", where_, twist.share);
-    if (!(std::abs(twist.share) <= 1)) failInvalid(in("share"), " is not from -1 to 1");
+    if (!(std::abs(twist.share) <= 1))
+      failInvalid(in("share"), " is ", double{twist.share}, ", which is not from -1 to 1");
   }
 
   void readCorrective(json& driver) {
@@ -186,7 +203,8 @@ class RigReader {
     corrective.inputs = rig_.jointLists.back();
     if (corrective.inputs.empty()) failInvalid(in("corrective"), " lists no joint");
     corrective.radius = readFloat(driver, "radius", where_, corrective.radius);
-    if (!(corrective.radius >= 0)) failInvalid(in("radius"), " is negative");
+    if (!(corrective.radius >= 0))
+      failInvalid(in("radius"), " is ", double{corrective.radius}, ", which is negative");
     json& examples = requireArray(driver, "examples", where_);
     if (examples.empty() || examples.size() > maxRigExamples)
       fail(examples.empty() ? ErrorCode::invalidData : ErrorCode::limitExceeded,
@@ -227,9 +245,12 @@ class RigReader {
     for (std::size_t i = 0; i < examples.size(); ++i) {
       const std::string where = join(where_, ": example ", i);
       json& example = examples[i];
-      for (auto& weight : example["weights"].items())
+      for (auto& weight : example["weights"].items()) {
+        const std::string what = join(where, ": the weight ", inQuotes(weight.key()));
+        if (!weight.value().is_number()) failInvalid(what, " is not a number");
         values[i * weights.size() + weights.at(weight.key())] =
-            readNumbers<1>(json::array({weight.value()}), where + ": a weight")[0];
+            readNumbers<1>(json::array({weight.value()}), what)[0];
+      }
       for (auto& joint : example["joints"].items()) {
         json name = joint.key();
         offsets[i * joints.size() + joints.at(jointOf(name, where))] =
@@ -273,6 +294,13 @@ class RigReader {
     rig_.jointLists.push_back(jointsOf(driver["chain"], in("chain")));
     chain.joints = rig_.jointLists.back();
     if (chain.joints.size() < 2) failInvalid(in("chain"), " lists less than two joints");
+    for (std::size_t i = 1; i < chain.joints.size(); ++i) {
+      const std::uint32_t joint = chain.joints[i], before = chain.joints[i - 1];
+      if (joint == before) failInvalid(in("chain"), " lists the joint ", nameOf(joint), " twice");
+      if (descendants_.isOrIsBelow(skin_.joints[before], skin_.joints[joint]))
+        failInvalid(in("chain"), ": the joint ", nameOf(joint), " is above ", nameOf(before),
+                    "; list joints from the root to the tip");
+    }
     const std::uint64_t segments = requireInteger(driver, "segments", where_);
     if (segments < 2 || segments > mostJoints)
       failInvalid(in("segments"), " is ", segments, ", which is not from 2 to ", mostJoints);
@@ -329,6 +357,7 @@ class RigReader {
       rig_.joints[rig_.places[joint]] = {above[skin_.joints[joint]],
                                          inverseOrZero(skin_.inverseBindMatrices[joint])};
 
+    noteChildren(above);
     for (std::vector<std::uint32_t>& list : rig_.jointLists)
       for (std::uint32_t& joint : list) joint = rig_.places[joint];
     for (TwistDriver& twist : rig_.twists) {
@@ -340,6 +369,25 @@ class RigReader {
     for (ChainDriver& chain : rig_.chains) {
       chain.firstDriven = next;
       next += chain.segments - 1;
+    }
+  }
+
+  /// Notes written joints below driven ones. `above`: by node, the joint of the rig above it.
+  void noteChildren(const std::vector<std::uint32_t>& above) {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> below;  // by driven joint
+    for (std::uint32_t joint = 0; joint < skin_.joints.size(); ++joint) {
+      if (const std::uint32_t parent = above[skin_.joints[joint]];
+          parent != none && !drivenJoints_.contains(joint))
+        below[parent].push_back(joint);
+    }
+    for (const auto& [joint, driver] : drivenJoints_) {
+      const auto found = below.find(rig_.places[joint]);
+      if (found == below.end()) continue;
+      const std::size_t others = found->second.size() - 1;
+      rig_.notes.push_back(join("the rig of skin ", number_, ": ", nameOf(found->second[0]),
+                                others == 0 ? "" : join(" and ", counted(others, "other joint")),
+                                " below the driven joint ", nameOf(joint), " follow",
+                                others == 0 ? "s" : "", " the node, not the driver"));
     }
   }
 
@@ -442,6 +490,7 @@ class RigReader {
   std::uint32_t number_;
   MemoryBudget& budget_;
   OwnedRig& rig_;
+  Descendants descendants_;
   std::map<std::string, std::uint32_t> names_;  ///< joints of the skin; `none`: several
   std::size_t driver_ = 0;
   std::string where_;

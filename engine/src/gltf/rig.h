@@ -29,6 +29,7 @@ struct OwnedRig {
 
   std::vector<std::uint32_t> places;  ///< by joint of the skin: the joint of the rig
   std::vector<std::string> driven;    ///< names of driven weights
+  std::vector<std::string> notes;
 };
 
 /// Reads the text for a skin of the model. Throws `Failure`.

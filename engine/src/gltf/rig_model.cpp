@@ -1,6 +1,7 @@
 // Applies rigs to models.
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -291,6 +292,7 @@ Result<std::shared_ptr<const RigView>> applyRig(Model& model, std::uint32_t skin
     const auto rig = std::make_shared<OwnedRig>();
     readRig(model, skin, text, budget, *rig);
     RigApplier(model, skin, *rig, budget).run();
+    std::ranges::move(rig->notes, std::back_inserter(model.notes));
     model.memoryLeft = budget.left();
     return std::shared_ptr<const RigView>(rig, &rig->view);
   });
