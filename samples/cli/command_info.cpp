@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "commands.h"
 #include "kit/text.h"
@@ -20,7 +24,36 @@ struct InfoOptions {
   bool strict = false;
 };
 
-Json describePart(const Scene& scene, const ScenePart& part) {
+/// Cut, as in messages: skins may share joints.
+Json nodeNames(const gltf::Model& model, const std::vector<std::uint32_t>& nodes) {
+  Json names = Json::array();
+  for (const std::uint32_t node : nodes)
+    names.push_back(samples::shortName(model.nodes[node].name));
+  return names;
+}
+
+/// The names of a part's morph targets.
+Json targetNames(const Scene& scene, const ScenePart& part) {
+  const gltf::Node& node = scene.model->nodes[part.source.node];
+  const std::vector<std::string>& all = scene.model->meshes[node.mesh].morphTargetNames;
+  Json names = Json::array();
+  for (std::size_t i = 0; i < std::min(all.size(), part.primitive->morphTargets.size()); ++i)
+    names.push_back(samples::shortName(all[i]));
+  return names;
+}
+
+/// In quotes, separated by commas.
+std::string listed(const Json& names) {
+  constexpr std::size_t most = 200;
+  std::string list;
+  for (std::size_t i = 0; i < std::min(names.size(), most); ++i) {
+    if (i > 0) list += ", ";
+    list += "'" + names[i].get<std::string>() + "'";
+  }
+  return names.size() > most ? fmt::format("{} and {} more", list, names.size() - most) : list;
+}
+
+Json describePart(const Scene& scene, const ScenePart& part, bool isFirst) {
   const gltf::Primitive& primitive = *part.primitive;
   Json json;
   json["name"] = part.name;
@@ -31,6 +64,8 @@ Json describePart(const Scene& scene, const ScenePart& part) {
   json["normals"] = !primitive.normals.empty();
   json["tangents"] = !primitive.tangents.empty();
   json["morphTargets"] = primitive.morphTargets.size();
+  // Parts may share a mesh.
+  if (isFirst) json["morphTargetNames"] = targetNames(scene, part);
   json["influencesStored"] = primitive.influencesPerVertex();
   json["influencesUsed"] = part.mesh ? part.mesh->packed().info().maxInfluences : 0;
   json["jointsUsed"] = part.mesh ? part.mesh->packed().info().requiredJoints : 0;
@@ -51,10 +86,16 @@ Json describePart(const Scene& scene, const ScenePart& part) {
 Json describe(const Scene& scene, const InfoOptions& options) {
   Json json;
   json["meshes"] = Json::array();
-  for (const ScenePart& part : scene.parts) json["meshes"].push_back(describePart(scene, part));
+  std::set<const gltf::Primitive*> described;
+  for (const ScenePart& part : scene.parts) {
+    const bool isFirst = described.insert(part.primitive).second;
+    json["meshes"].push_back(describePart(scene, part, isFirst));
+  }
   json["skins"] = Json::array();
   for (const gltf::Skin& skin : scene.model->skins) {
-    json["skins"].push_back({{"name", skin.name}, {"joints", skin.joints.size()}});
+    json["skins"].push_back({{"name", skin.name},
+                             {"joints", skin.joints.size()},
+                             {"jointNames", nodeNames(*scene.model, skin.joints)}});
   }
   json["rigs"] = Json::array();
   for (const auto& [skin, rig] : scene.rigs) {
@@ -62,6 +103,7 @@ Json describe(const Scene& scene, const InfoOptions& options) {
                             {"writtenJoints", rig.packed.writtenJoints()},
                             {"drivenJoints", rig.packed.drivenJoints()},
                             {"drivenWeights", rig.packed.drivenWeights()},
+                            {"drivenJointNames", nodeNames(*scene.model, rig.drivenNodes)},
                             {"twists", rig.view->twists.size()},
                             {"correctives", rig.view->correctives.size()},
                             {"chains", rig.view->chains.size()},
@@ -94,11 +136,15 @@ void printText(const Json& json) {
         mesh["normals"].get<bool>() ? "normals, " : "",
         mesh["tangents"].get<bool>() ? "tangents, " : "", mesh["influencesUsed"].get<int>(),
         mesh["influencesStored"].get<int>(), mesh["skin"].get<int>(), mesh["joints"].get<int>());
+    if (mesh.contains("morphTargetNames") && !mesh["morphTargetNames"].empty())
+      fmt::print("       morph targets {}\n", listed(mesh["morphTargetNames"]));
     for (const Json& problem : mesh["problems"]) {
       fmt::print("       {} ({} vertices): {}\n", text(problem["kind"]),
                  problem["vertices"].get<int>(), text(problem["message"]));
     }
   }
+  for (std::size_t skin = 0; skin < json["skins"].size(); ++skin)
+    fmt::print("skin   {}: joints {}\n", skin, listed(json["skins"][skin]["jointNames"]));
   for (const Json& rig : json["rigs"]) {
     fmt::print(
         "rig    of skin {}: {} joints and {} morph weights driven by {} twists, {} correctives, {} "
@@ -106,6 +152,8 @@ void printText(const Json& json) {
         rig["skin"].get<int>(), rig["drivenJoints"].get<int>(), rig["drivenWeights"].get<int>(),
         rig["twists"].get<int>(), rig["correctives"].get<int>(), rig["chains"].get<int>(),
         rig["linear"].get<int>());
+    if (!rig["drivenJointNames"].empty())
+      fmt::print("       drives joints {}\n", listed(rig["drivenJointNames"]));
   }
   std::size_t number = 0;
   for (const Json& clip : json["clips"]) {

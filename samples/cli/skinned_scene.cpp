@@ -175,12 +175,21 @@ Result<void> addRigs(Scene& scene, const std::string& file, const MeshPreparatio
   for (const std::uint32_t skin : skins) {
     const std::string text = own ? *own : model.skins[skin].rig;
     if (text.empty() && !own) continue;
+    const std::vector<std::uint32_t> joints = model.skins[skin].joints;
+    const std::size_t notes = model.notes.size();
     Result<std::shared_ptr<const RigView>> view = gltf::applyRig(model, skin, text);
+    const std::string name = own ? nameOf(samples::pathOf(preparation.rig)) : file;
     if (view) {
-      scene.rigs.emplace(skin, SceneRig{*view, samples::must(packRig(**view))});
+      SceneRig rig{*view, samples::must(packRig(**view)), {}};
+      const std::vector<std::uint32_t>& left = model.skins[skin].joints;
+      const std::set<std::uint32_t> written(left.begin(), left.end());
+      std::ranges::copy_if(joints, std::back_inserter(rig.drivenNodes),
+                           [&](std::uint32_t node) { return !written.contains(node); });
+      scene.rigs.emplace(skin, std::move(rig));
+      for (std::size_t note = notes; note < model.notes.size(); ++note)
+        scene.notes.push_back(fmt::format("{}: {}", samples::inQuotes(name), model.notes[note]));
       continue;
     }
-    const std::string name = own ? nameOf(samples::pathOf(preparation.rig)) : file;
     const Error error{view.error().code, fmt::format("{}: skin {}: {}", samples::inQuotes(name),
                                                      skin, view.error().message)};
     if (!own) return error;

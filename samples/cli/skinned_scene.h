@@ -37,6 +37,7 @@ struct ClipFile {
 struct SceneRig {
   std::shared_ptr<const RigView> view;
   PackedRig packed;
+  std::vector<std::uint32_t> drivenNodes;  ///< of joints of the skin
 };
 
 struct Scene {

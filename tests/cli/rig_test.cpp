@@ -116,6 +116,10 @@ TEST_F(RigTest, IsListedByInfo) {
                                "1 correctives, 1 chains, 0 linear drivers"),
             std::string::npos)
       << result.output;
+  for (const char* line :
+       {"\n       drives joints 'twist', 'muscle'\n", "\n       morph targets 'smile', 'bent'\n",
+        "\nskin   0: joints 'upper', 'lower', 'hand'\n"})
+    EXPECT_NE(result.output.find(line), std::string::npos) << line << "in\n" << result.output;
 }
 
 TEST_F(RigTest, IsCompared) {
@@ -145,6 +149,18 @@ TEST_F(RigTest, AMistakeNamesTheFileTheSkinAndTheDriver) {
       << result.errors;
   expectOneErrorLine(result);
   expectOneErrorLine(skin({"--rig", outFile("absent.json")}));
+}
+
+TEST_F(RigTest, WhatIsBelowADrivenJointIsANote) {
+  const std::string rig = outFile("rig.json");
+  std::ofstream(rig)
+      << R"({"drivers": [{"twist": "lower", "source": "upper", "axis": [1, 0, 0]}]})";
+  const CommandResult result = skin({"--rig", rig});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(result.errors.find("rig.json': the rig of skin 0: 'twist' and 1 other joint below the "
+                               "driven joint 'lower' follow"),
+            std::string::npos)
+      << result.errors;
 }
 
 TEST_F(RigTest, IsNotOverwritten) {
