@@ -198,7 +198,7 @@ TEST_P(GpuModelTest, EveryStepGivesWhatTheModelSays) {
                 "the engine's allocator has had enough"});
   expectAllGiven(texts);
 }
-INSTANTIATE_TEST_SUITE_P(Seeds, GpuModelTest, ::testing::Values(1u, 2u, 3u));
+INSTANTIATE_TEST_SUITE_P(Seeds, GpuModelTest, ::testing::Values(1u, 2u));
 
 }  // namespace
 }  // namespace dermis::test

@@ -31,6 +31,8 @@ here = Path(__file__).resolve().parent
 root = here.parent.parent
 tree = root / "build/nightly/mutants"
 tests = tree / "build/ci/tests"
+if (root.parent / "shared").is_dir():  # which tests of the copy would not find
+    os.environ.setdefault("DERMIS_TEST_DATA", str(root.parent / "shared"))
 time_limit = 60  # seconds of one test; a mistake may cause an endless loop
 memory_limit = 16 << 30
 jobs = os.cpu_count() or 2
