@@ -159,8 +159,8 @@ def normals_of(points, triangles):
 
 
 # In meters. Of the bent elbow: its tip, the swollen upper arm, the forearm, the crease. Of the raised arm: its top, the armpit.
-ELBOW = (0.022, 0.014, 0.008, -0.006)
-SHOULDER = (0.05, 0.02)
+ELBOW = (0.02, 0.02, 0.012, -0.01)
+SHOULDER = (0.03, 0.015)
 
 
 def hill(x, middle, width): return math.exp(-((x - middle) / width) ** 2)
@@ -231,7 +231,7 @@ def make_arm():
     front = [0, 0, 1]
     elbow_degrees, shoulder_degrees, twist_degrees = 125, 95, 150
     elbow, shoulder = [], []
-    for point in points:
+    for point, of in zip(points, weights):
         at = upper.local(point)
         s = at[1] - by_name["leftForearm"].translation[1]
         if s > 0:
@@ -245,12 +245,14 @@ def make_arm():
         push = inner * (ELBOW[1] * hill(s, -0.12, 0.055) + ELBOW[2] * hill(s, 0.075, 0.04) + ELBOW[3] * hill(s, 0, 0.03))
         elbow.append(scale(flexor, push - move) if -0.25 < s < 0.2 else [0, 0, 0])
         away = sub(point, upper.place)
-        up = unit([0.5, 1, 0])
-        top = max(dot(unit(away), up), 0)
         near = math.sqrt(dot(away, away))
-        lift = scale(up, SHOULDER[0] * top ** 2 * hill(near, 0.02, 0.075))
+        top = max(dot(unit(away), unit([0.5, 1, 0])), 0)
         under = max(-dot(unit(away), [-0.3, 0.95, 0]), 0)
-        shoulder.append(add(lift, scale([0.6, -0.5, 0], SHOULDER[1] * under * hill(near, 0.07, 0.05))))
+        wanted = add(scale(unit([0.6, 1, 0]), SHOULDER[0] * top * hill(near, 0.03, 0.07)),
+                     scale(unit([0.6, -0.5, 0]), SHOULDER[1] * under * hill(near, 0.07, 0.05)))
+        # What turns with the arm turns its displacement, too.
+        turns = 1 - sum(of.get(index[name], 0) for name in ("upperChest", "leftClavicle"))
+        shoulder.append(turned(turn(front, -shoulder_degrees * turns), wanted))
     before = normals_of(points, triangles)
     moved = [[add(p, d) for p, d in zip(points, target)] for target in (elbow, shoulder)]
     changes = [[sub(after, old) for after, old in zip(normals_of(points_of, triangles), before)] for points_of in moved]
