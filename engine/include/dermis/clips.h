@@ -227,9 +227,9 @@ inline constexpr std::uint32_t maxMasks = 31;    ///< of a bank
 ///   move a node above that of `rootMotion`, or the global transform at rest of its parent is not
 ///   made of translation, rotation and uniform scale;
 /// - `limitExceeded` if there are more than `maxClips` or `maxMasks`, a skin has more than
-///   `maxPoseJoints` joints, a number leaves the range of float32, keys take more memory than 64 MiB
-///   and 64 times that of the source, or the error cannot be kept: the message names the clip and
-///   the node.
+///   `maxPoseJoints` joints, a number leaves the range of float32, keys take more memory than 64
+///   MiB and 64 times that of the source, or the error cannot be kept: the message names the clip
+///   and the node.
 DERMIS_CORE_API Result<PackedClips> packClips(const Skeleton& skeleton,
                                               std::span<const ClipView> clips,
                                               const PackClipsOptions& options = {},

@@ -40,7 +40,8 @@ class BankCheck {
       if (!isSkin(bank_.skin(i))) return damagedBank("skin " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.morphedCount; ++i) {
-      if (!isMorphed(bank_.morphed(i)))
+      if (!isMorphed(bank_.morphed(i)) ||
+          (i > 0 && bank_.morphed(i).source <= bank_.morphed(i - 1).source))
         return damagedBank("node with weights " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.clipCount; ++i) {

@@ -43,7 +43,7 @@ struct BankNode {
 /// `firstGroup` + i / 3. In a clip the track of group g is word 3 × `nodeCount` + g of its tracks,
 /// and is stored as one of a translation.
 struct BankMorphed {
-  std::uint32_t source;  ///< node of the skeleton
+  std::uint32_t source;  ///< node of the skeleton; ascending
   std::uint32_t count;   ///< weights, at least 1
   std::uint32_t firstGroup;
   std::uint32_t rest;   ///< 3 numbers for each group
@@ -210,8 +210,12 @@ struct ClipBank {
   }
   /// The one of a node of the skeleton, if it has weights.
   std::optional<BankMorphed> morphedNode(std::uint32_t source) const {
-    for (std::size_t i = 0; i < header.morphedCount; ++i) {
-      if (const BankMorphed found = morphed(i); found.source == source) return found;
+    std::size_t begin = 0, end = header.morphedCount;
+    while (begin < end) {
+      const std::size_t middle = begin + (end - begin) / 2;
+      const BankMorphed found = morphed(middle);
+      if (found.source == source) return found;
+      (found.source < source ? begin : end) = found.source < source ? middle + 1 : middle;
     }
     return std::nullopt;
   }

@@ -135,8 +135,8 @@ class BankWriter {
   void writeClip(std::size_t offset, std::size_t number, PackClipsReport& report) {
     const FittedClip& clip = parts_.fitted[number];
     std::vector<const Track*> tracks;  // in the order of their words
-    for (const std::array<Track, 3>& ofNode : clip.tracks) {
-      for (const Track& track : ofNode) tracks.push_back(&track);
+    for (const auto& ofNode : clip.tracks) {
+      for (const auto& track : ofNode) tracks.push_back(track.get());
     }
     for (const Track& track : clip.vectorTracks) tracks.push_back(&track);
     int finest = 20;

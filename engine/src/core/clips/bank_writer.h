@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -46,7 +47,8 @@ struct Hanging {
 
 struct FittedClip {
   double rate = 1;
-  std::vector<std::array<Track, 3>> tracks;  ///< of each node
+  /// Of each node. Most clips leave most nodes at rest: these share a track.
+  std::vector<std::array<std::shared_ptr<const Track>, 3>> tracks;
   std::vector<Track> vectorTracks;  ///< of each group of weights, then of the root motion if any
 };
 

@@ -4,6 +4,7 @@
 #include <deque>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -82,7 +83,8 @@ class Packer {
       : skeleton_(skeleton), clips_(clips), options_(options) {
     for (const ClipView& clip : clips) {
       for (const ChannelView& channel : clip.channels)
-        memoryLeft_ += 64 * (channel.times.size_bytes() + channel.values.size_bytes());
+        memoryLeft_ +=
+            64 * (std::uint64_t{channel.times.size_bytes()} + channel.values.size_bytes());
     }
   }
 
@@ -93,6 +95,11 @@ class Packer {
     if (Result<void> good = findRootMotion(); !good) return good.error();
     measureReach();
     report.maxError = maxError_;
+    if (!spend(std::uint64_t{clips_.size()} * moved_.size() * sizeof(FittedClip::tracks[0])))
+      return Error{ErrorCode::limitExceeded,
+                   "packClips: " + std::to_string(clips_.size()) + " clips of " +
+                       std::to_string(moved_.size()) +
+                       " nodes take more memory than 64 MiB and 64 times that of their keys"};
     for (std::size_t i = 0; i < clips_.size(); ++i) {
       Result<FittedClip> packed = packClip(i, report);
       if (!packed) return packed.error();
@@ -110,12 +117,13 @@ class Packer {
     return true;
   }
   bool spend(const Track& track) {
-    return spend(track.keys.size() * (2 * sizeof(KeyBits)) + track.jumps.size() * 2);
+    return spend(sizeof(Track) + std::uint64_t{track.keys.size()} * (2 * sizeof(KeyBits)) +
+                 std::uint64_t{track.jumps.size()} * 2);
   }
   Error tooLarge(std::size_t clip) const {
     return {ErrorCode::limitExceeded, "packClips: " + titled("clip", clip, clips_[clip].name) +
-                                          ": the keys of the clips so far take more memory than "
-                                          "64 MiB and 64 times that of the source"};
+                                          ": with its keys, clips take more memory than 64 MiB "
+                                          "and 64 times that of the source; allow a larger error"};
   }
 
   /// By node and path. Keys of rotations get unit length, which they need between keys.
@@ -415,7 +423,7 @@ class Packer {
             fitTrack(curve, clip.additive ? Value{} : rest, duration, packed.rate, tolerance);
         if (!track)
           return unkept(where(number, node.source), "maxWeightError", tolerance, packed.rate);
-        if (!spend(sizeof(Track)) || !spend(*track)) return tooLarge(number);
+        if (!spend(*track)) return tooLarge(number);
         node.error = std::max(node.error, static_cast<float>(track->error * (1 + 0x1p-23)));
         packed.vectorTracks.push_back(*std::move(track));
       }
@@ -434,7 +442,6 @@ class Packer {
 
   Result<FittedClip> packClip(std::size_t number, PackClipsReport& report) {
     FittedClip packed;
-    if (!spend(moved_.size() * 3 * sizeof(Track))) return tooLarge(number);
     const double duration = double{static_cast<float>(clips_[number].duration)};
     packed.rate = double{static_cast<float>(rateOf(clips_[number]))};
     const std::vector<std::array<Curve, 3>> source = curvesOf(number);
@@ -468,8 +475,10 @@ class Packer {
               fitTrack(curves[i][p], stillOf(number, i)[p], duration, packed.rate, tolerances[p]);
           if (!track)
             return unkept(where(number, moved_[i].source), "maxError", maxError_, packed.rate);
-          if (!spend(*track)) return tooLarge(number);
-          packed.tracks[i][p] = *std::move(track);
+          const bool isAtRest = track->kind == TrackKind::rest && track->error == 0;
+          if (!isAtRest && !spend(*track)) return tooLarge(number);
+          packed.tracks[i][p] =
+              isAtRest ? atRest_ : std::make_shared<const Track>(*std::move(track));
         }
       }
       worst = errorOf(number, packed, source, duration, split.has_value(), worstNode, worstTime);
@@ -481,7 +490,7 @@ class Packer {
       float* const errors[] = {&moved_[i].error.translation, &moved_[i].error.rotation,
                                &moved_[i].error.scale};
       for (std::size_t p = 0; p < 3; ++p) {
-        double error = packed.tracks[i][p].error * (1 + 0x1p-23);
+        double error = packed.tracks[i][p]->error * (1 + 0x1p-23);
         if (split && i == carrier_ && p == 1) error += split->turnError;
         *errors[p] = std::max(*errors[p], static_cast<float>(error));
       }
@@ -554,7 +563,7 @@ class Packer {
     std::vector<std::pair<double, double>> all, merged;
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       for (std::size_t p = 0; p < 3; ++p) {
-        const Track& track = packed.tracks[i][p];
+        const Track& track = *packed.tracks[i][p];
         const double clearance = track.jumps.empty()  // the jump is too small to count
                                      ? 0.01 / packed.rate
                                      : jumpClearance * std::ldexp(1, track.level) / packed.rate;
@@ -603,7 +612,7 @@ class Packer {
       const std::vector<Transform> exact =
           globalsOf(number, [&](std::size_t i, std::size_t p) { return curves[i][p].at(time); });
       std::vector<Transform> stored = globalsOf(number, [&](std::size_t i, std::size_t p) {
-        return packed.tracks[i][p].at(time, packed.rate, stillOf(number, i)[p], p == 1);
+        return packed.tracks[i][p]->at(time, packed.rate, stillOf(number, i)[p], p == 1);
       });
       if (isSplit) {
         const Transform motion = motionAt(packed, time);
@@ -633,6 +642,7 @@ class Packer {
   std::span<const ClipView> clips_;
   const PackClipsOptions& options_;
   std::uint64_t memoryLeft_ = std::uint64_t{64} << 20;  ///< bytes
+  const std::shared_ptr<const Track> atRest_ = std::make_shared<const Track>();
   std::vector<std::map<std::pair<std::uint32_t, ChannelPath>, ChannelView>> channels_;
   std::deque<std::vector<float>> changedKeys_;  ///< which channels point to
   std::vector<MovedNode> moved_;
