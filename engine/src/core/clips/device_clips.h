@@ -10,8 +10,8 @@
 
 namespace dermis {
 
-/// So many levels of nodes are a band: a dispatch finds their global transforms, from those that the
-/// dispatch for the band above has stored.
+/// So many levels of nodes are a band: a dispatch finds their global transforms, from those that
+/// the dispatch for the band above has stored.
 inline constexpr std::uint32_t bandDepth = abi::MAX_CHAIN - 1;
 
 struct DeviceClips {
