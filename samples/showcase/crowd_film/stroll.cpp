@@ -15,7 +15,15 @@ namespace crowd_film {
 namespace {
 
 /// Purposes of `chance`.
-enum Purpose : std::uint32_t { clipChoice, phaseChoice, along, across, look, size, changeTime };
+enum Purpose : std::uint32_t {
+  clipChoice,
+  phaseChoice,
+  alongPath,
+  acrossPath,
+  look,
+  size,
+  changeTime
+};
 
 // In meters, for a figure of 1.75 m. A long animal is measured by its length.
 constexpr double standingSpacing = 0.95;
@@ -91,8 +99,9 @@ void Stroll::castWalking(std::uint32_t figures) {
     for (std::uint32_t place = 0; place < here; ++place, ++figure) {
       role.phase = static_cast<std::uint32_t>(chance(figure, phaseChoice) *
                                               character_->tickCount(role.clip));
-      role.radius = (radius + 0.2 * deviation(figure, across)) * unit_;
-      role.angle = 2 * std::numbers::pi * (place + 0.2 * deviation(figure, along)) / room + ring;
+      role.radius = (radius + 0.2 * deviation(figure, acrossPath)) * unit_;
+      role.angle =
+          2 * std::numbers::pi * (place + 0.2 * deviation(figure, alongPath)) / room + ring;
       roles_.push_back(role);
     }
   }
