@@ -230,6 +230,27 @@ TEST(ClipsModels, JointsOfSkinsThatAreCalledRigidNeverScale) {
   EXPECT_TRUE(rigid < skins || !testDataFolder() || hasFewCases);
 }
 
+// A node of its own: a rotation leaves it rigid, an animated scale does not, whatever it is at
+// rest.
+TEST(ClipsRigid, ASkinWithAnAnimatedScaleIsNotCalledRigid) {
+  const std::array<std::uint32_t, 1> joints{0};
+  const std::array<JointMatrix, 1> inverseBind{};
+  const Skeleton skeleton{{SkeletonNode{}}, {{"skin", joints, inverseBind}}};
+  const std::array times{0.0f, 1.0f};
+  const std::array turns{0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f};
+  const std::array scales{1.0f, 1.0f, 1.0f, 1.0f, 2.0f, 1.0f};
+  std::vector<ChannelView> channels{
+      {0, ChannelPath::rotation, Interpolation::linear, times, turns}};
+  for (const bool scalesToo : {false, true}) {
+    if (scalesToo)
+      channels.push_back({0, ChannelPath::scale, Interpolation::linear, times, scales});
+    const std::array clips{ClipView{.name = "clip", .duration = 1, .channels = channels}};
+    const Result<PackedClips> bank = packClips(skeleton, clips);
+    ASSERT_TRUE(bank.ok()) << bank.error().message;
+    EXPECT_EQ(rigidSkins(*bank)[0], !scalesToo);
+  }
+}
+
 TEST(ClipsModels, LayersAreWithinTheirBounds) {
   forEachModel([](gltf::Model model, std::uint32_t) {
     std::mt19937 random(2);
