@@ -230,8 +230,7 @@ TEST(ClipsModels, JointsOfSkinsThatAreCalledRigidNeverScale) {
   EXPECT_TRUE(rigid < skins || !testDataFolder() || hasFewCases);
 }
 
-// A node of its own: a rotation leaves it rigid, an animated scale does not, whatever it is at
-// rest.
+// The skin has one node, which first only turns. Then a clip scales it, too.
 TEST(ClipsRigid, ASkinWithAnAnimatedScaleIsNotCalledRigid) {
   const std::array<std::uint32_t, 1> joints{0};
   const std::array<JointMatrix, 1> inverseBind{};
