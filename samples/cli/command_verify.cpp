@@ -304,7 +304,7 @@ class Verifier {
     const SceneCases cases = casesOf(*scene, pool_.first(), poses.size(), coverage_);
     samples::Progress progress(model, cases.batches.size());
     Cases verified = verifyScene(pool_, *scene, poses, cases, [&progress] { progress.step(); });
-    if (verified) verified = with(verifyRigs(*scene, poses), std::move(*verified));
+    if (verified) verified = with(verifyRigs(pool_.first(), *scene, poses), std::move(*verified));
     if (verified) verified = withClips(*scene, std::move(*verified));
     add(model, std::move(verified));
   }

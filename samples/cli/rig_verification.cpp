@@ -46,45 +46,60 @@ class Compared {
   bool isWrong_ = false, isUndefined_ = false;
 };
 
+/// `found`: what the rig of the skin drives in the pose.
+Result<void> compareDriven(const SceneRig& rig, const samples::RigInput& input,
+                           const samples::DrivenPose& found, VerifiedCase verified,
+                           std::vector<VerifiedCase>& cases) {
+  const Result<reference::EvaluatedRig> expected =
+      reference::evaluateRig(*rig.view, input.written, input.givenWeights);
+  if (!expected) return expected.error();
+  Compared ofJoints, ofWeights;
+  for (std::uint32_t joint = 0; joint < found.joints.size(); ++joint) {
+    for (std::size_t i = 0; i < 12; ++i) {
+      ofJoints.add(joint, found.joints[joint].m[i / 4][i % 4],
+                   expected->joints[joint][i / 4][i % 4],
+                   expected->jointBounds[joint][i / 4][i % 4]);
+    }
+    ofJoints.endElement(joint);
+  }
+  verified.variant = "driven joints";
+  verified.comparison = ofJoints.comparison();
+  if (!found.joints.empty()) cases.push_back(verified);
+  for (std::uint32_t weight = 0; weight < found.weights.size(); ++weight) {
+    ofWeights.add(weight, found.weights[weight], expected->weights[weight],
+                  expected->weightBounds[weight]);
+    ofWeights.endElement(weight);
+  }
+  verified.variant = weightsVariant;
+  verified.comparison = ofWeights.comparison();
+  if (!found.weights.empty()) cases.push_back(verified);
+  return {};
+}
+
+constexpr std::size_t posesAtOnce = 32;
+
 }  // namespace
 
-Result<std::vector<VerifiedCase>> verifyRigs(const Scene& scene,
+Result<std::vector<VerifiedCase>> verifyRigs(samples::BatchTarget& target, const Scene& scene,
                                              std::span<const PoseToVerify> poses) {
   std::vector<VerifiedCase> cases;
-  for (const PoseToVerify& pose : poses) {
-    for (const auto& [skin, rig] : scene.rigs) {
-      const RigInput input = rigInput(scene, skin, pose.clip, pose.time);
-      const Result<reference::EvaluatedRig> expected =
-          reference::evaluateRig(*rig.view, input.written, input.givenWeights);
-      if (!expected) return expected.error();
-      std::vector<JointMatrix> joints(rig.packed.drivenJoints());
-      std::vector<float> weights(rig.packed.givenWeights() + rig.packed.drivenWeights());
-      const Result<void> evaluated =
-          evaluateRig(rig.packed, input.written, input.givenWeights, joints, weights);
-      if (!evaluated) return evaluated.error();
-      VerifiedCase verified;
-      verified.part = fmt::format("the rig of skin {}", skin);
-      verified.method = rigMethod;
-      verified.pose = pose.name;
-      verified.variant = "driven joints";
-      Compared ofJoints, ofWeights;
-      for (std::uint32_t joint = 0; joint < joints.size(); ++joint) {
-        for (std::size_t i = 0; i < 12; ++i) {
-          ofJoints.add(joint, joints[joint].m[i / 4][i % 4], expected->joints[joint][i / 4][i % 4],
-                       expected->jointBounds[joint][i / 4][i % 4]);
-        }
-        ofJoints.endElement(joint);
+  for (const auto& [skin, rig] : scene.rigs) {
+    for (std::span rest = poses; !rest.empty();) {
+      const std::span some = rest.first(std::min(rest.size(), posesAtOnce));
+      rest = rest.subspan(some.size());
+      std::vector<samples::RigInput> inputs;
+      for (const PoseToVerify& pose : some)
+        inputs.push_back(rigInput(scene, skin, pose.clip, pose.time));
+      const Result<std::vector<samples::DrivenPose>> found = target.drivePoses(rig.packed, inputs);
+      if (!found) return found.error();
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        VerifiedCase verified;
+        verified.part = fmt::format("the rig of skin {}", skin);
+        verified.method = rigMethod;
+        verified.pose = some[i].name;
+        if (Result<void> done = compareDriven(rig, inputs[i], (*found)[i], verified, cases); !done)
+          return done.error();
       }
-      verified.comparison = ofJoints.comparison();
-      if (!joints.empty()) cases.push_back(verified);
-      for (std::uint32_t weight = 0; weight < weights.size(); ++weight) {
-        ofWeights.add(weight, weights[weight], expected->weights[weight],
-                      expected->weightBounds[weight]);
-        ofWeights.endElement(weight);
-      }
-      verified.variant = weightsVariant;
-      verified.comparison = ofWeights.comparison();
-      if (!weights.empty()) cases.push_back(verified);
     }
   }
   return cases;

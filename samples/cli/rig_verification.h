@@ -10,9 +10,10 @@
 
 namespace dermis::cli {
 
-/// Compares the joints and weights that the rigs of a scene drive in each pose with the reference.
-/// Nothing if it has no rigs. Cases compare joints or weights (`comparesVertices` is false).
-Result<std::vector<VerifiedCase>> verifyRigs(const Scene& scene,
+/// Compares the joints and weights that the rigs of a scene drive in each pose, on a target, with
+/// the reference. Nothing if it has no rigs. Cases compare joints or weights (`comparesVertices` is
+/// false).
+Result<std::vector<VerifiedCase>> verifyRigs(samples::BatchTarget& target, const Scene& scene,
                                              std::span<const PoseToVerify> poses);
 
 }  // namespace dermis::cli

@@ -332,10 +332,10 @@ Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::st
 
 namespace {
 
-RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time,
-                  std::span<const Transform> globals) {
+samples::RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time,
+                           std::span<const Transform> globals) {
   const SceneRig& rig = scene.rigs.at(skin);
-  RigInput input{gltf::pose(*scene.model, skin, globals), {}};
+  samples::RigInput input{gltf::pose(*scene.model, skin, globals), {}};
   if (rig.packed.givenWeights() != 0)
     input.givenWeights = gltf::morphWeights(*scene.model, rig.view->weightsOf, clip, time);
   return input;
@@ -347,7 +347,7 @@ struct DrivenPose {
   std::vector<float> weights;
 };
 
-DrivenPose drive(const PackedRig& rig, const RigInput& input) {
+DrivenPose drive(const PackedRig& rig, const samples::RigInput& input) {
   DrivenPose pose{input.written, {}};
   pose.palette.resize(input.written.size() + rig.drivenJoints());
   std::vector<float> weights(input.givenWeights.size() + rig.drivenWeights());
@@ -359,7 +359,8 @@ DrivenPose drive(const PackedRig& rig, const RigInput& input) {
 
 }  // namespace
 
-RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time) {
+samples::RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip,
+                           double time) {
   return rigInput(scene, skin, clip, time, gltf::nodeGlobals(*scene.model, clip, time));
 }
 

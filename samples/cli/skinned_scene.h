@@ -14,6 +14,7 @@
 #include "dermis/gltf.h"
 #include "dermis/result.h"
 #include "dermis/rig.h"
+#include "kit/batch_runner.h"
 #include "prepared_mesh.h"
 
 namespace dermis::cli {
@@ -87,12 +88,7 @@ struct ScenePose {
 };
 
 /// What the rig of a skin reads at one time.
-struct RigInput {
-  std::vector<JointMatrix> written;
-  std::vector<float> givenWeights;
-};
-
-RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time);
+samples::RigInput rigInput(const Scene& scene, std::uint32_t skin, std::uint32_t clip, double time);
 
 ScenePose scenePose(const Scene& scene, std::uint32_t clip, double time);
 

@@ -18,6 +18,7 @@
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "dermis/rig.h"
 #include "dermis/verify.h"
 #include "dermis/vulkan/context.h"
 #include "kit/buffer.h"
@@ -141,6 +142,17 @@ struct Division {
   std::string instructions;
 };
 
+/// What a rig reads in one pose.
+struct RigInput {
+  std::vector<JointMatrix> written;
+  std::vector<float> givenWeights;
+};
+/// What it drives there.
+struct DrivenPose {
+  std::vector<JointMatrix> joints;
+  std::vector<float> weights;  ///< all of the rig
+};
+
 /// A device, or the CPU, that skins batches.
 class BatchTarget {
  public:
@@ -154,6 +166,9 @@ class BatchTarget {
   /// What figures that play these layers have as poses: figure by figure, one for each skin.
   virtual Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) = 0;
+  /// What a rig drives in each of these poses.
+  virtual Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
+                                                     std::span<const RigInput> inputs) = 0;
 
   /// Runs a single batch.
   Result<BatchResult> run(std::span<const SkinRequest> requests, const RunOptions& options = {}) {
@@ -173,6 +188,9 @@ class VulkanTarget : public BatchTarget {
   /// As a scene samples them.
   Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
+  /// As a scene drives them.
+  Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
+                                             std::span<const RigInput> inputs) override;
 
  private:
   Device& device_;
@@ -195,6 +213,8 @@ class CpuTarget : public BatchTarget {
   std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
   Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
+  Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
+                                             std::span<const RigInput> inputs) override;
 
  private:
   std::string instructions_;

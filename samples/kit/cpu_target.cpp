@@ -179,5 +179,19 @@ Result<std::vector<std::vector<JointMatrix>>> CpuTarget::samplePoses(
   }
   return poses;
 }
+Result<std::vector<DrivenPose>> CpuTarget::drivePoses(const PackedRig& rig,
+                                                      std::span<const RigInput> inputs) {
+  std::vector<DrivenPose> poses;
+  for (const RigInput& input : inputs) {
+    DrivenPose& pose = poses.emplace_back();
+    pose.joints.resize(rig.drivenJoints());
+    pose.weights.resize(std::size_t{rig.givenWeights()} + rig.drivenWeights());
+    if (Result<void> done =
+            evaluateRig(rig, input.written, input.givenWeights, pose.joints, pose.weights);
+        !done)
+      return done.error();
+  }
+  return poses;
+}
 
 }  // namespace dermis::samples

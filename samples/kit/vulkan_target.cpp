@@ -166,12 +166,10 @@ std::vector<vulkan::BufferRange> addFigures(vulkan::SceneRecorder& recorder,
   return ranges;
 }
 
-/// Throws `Failure`.
-std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan::Context& context,
-                                                   const PackedClips& bank,
-                                                   std::span<const std::vector<ClipLayer>> plays) {
-  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
-  const std::vector<vulkan::BufferRange> ranges = addFigures(recorder, bank, plays);
+/// Skins a frame, and returns what is in each of these buffers after it. Throws `Failure`.
+std::vector<std::vector<std::byte>> runFrame(Device& device, const vulkan::Context& context,
+                                             vulkan::SceneRecorder& recorder,
+                                             std::span<const vulkan::BufferRange> ranges) {
   std::uint64_t size = 0;
   for (const vulkan::BufferRange& range : ranges) size += range.size;
   const MappedBuffer copy =
@@ -189,12 +187,59 @@ std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan:
     context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
     return {};
   }));
-  std::vector<std::vector<JointMatrix>> poses;
+  std::vector<std::vector<std::byte>> contents;
   const std::byte* from = copy.bytes().data();
   for (const vulkan::BufferRange& range : ranges) {
-    std::vector<JointMatrix>& pose = poses.emplace_back(range.size / sizeof(JointMatrix));
-    std::memcpy(pose.data(), from, range.size);
+    contents.emplace_back(from, from + range.size);
     from += range.size;
+  }
+  return contents;
+}
+
+template <typename T>
+std::vector<T> arrayOf(std::span<const std::byte> bytes) {
+  std::vector<T> array(bytes.size() / sizeof(T));
+  if (!array.empty()) std::memcpy(array.data(), bytes.data(), array.size() * sizeof(T));
+  return array;
+}
+
+/// Throws `Failure`.
+std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan::Context& context,
+                                                   const PackedClips& bank,
+                                                   std::span<const std::vector<ClipLayer>> plays) {
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
+  const std::vector<vulkan::BufferRange> ranges = addFigures(recorder, bank, plays);
+  std::vector<std::vector<JointMatrix>> poses;
+  for (const std::vector<std::byte>& bytes : runFrame(device, context, recorder, ranges))
+    poses.push_back(arrayOf<JointMatrix>(bytes));
+  return poses;
+}
+
+/// Throws `Failure`.
+std::vector<DrivenPose> drivenPoses(Device& device, const vulkan::Context& context,
+                                    const PackedRig& rig, std::span<const RigInput> inputs) {
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
+  Scene& scene = recorder.scene();
+  // A rig is evaluated when an instance is skinned with its pose.
+  InstanceDescription point;
+  point.mesh = must(scene.addMesh(pointMesh()));
+  const RigHandle added = must(scene.addRig(PackedRig(rig)));
+  std::vector<vulkan::BufferRange> ranges;
+  for (const RigInput& input : inputs) {
+    point.pose = must(scene.addPose(rig.writtenJoints(), {.rig = added}));
+    std::ranges::copy(input.written, must(scene.writePose(point.pose)).begin());
+    if (!input.givenWeights.empty())
+      std::ranges::copy(input.givenWeights, must(scene.writePoseWeights(point.pose)).begin());
+    must(recorder.prepare(point));
+    must(scene.addInstance(point));
+    ranges.push_back(must(recorder.drivenRange(point.pose)));
+  }
+  const std::size_t ofJoints = rig.drivenJoints() * sizeof(JointMatrix);
+  std::vector<DrivenPose> poses;
+  for (const std::vector<std::byte>& bytes : runFrame(device, context, recorder, ranges)) {
+    const std::span<const std::byte> all(bytes);
+    poses.push_back(
+        {arrayOf<JointMatrix>(all.first(ofJoints)), arrayOf<float>(all.subspan(ofJoints))});
   }
   return poses;
 }
@@ -228,6 +273,15 @@ Result<std::vector<std::vector<JointMatrix>>> VulkanTarget::samplePoses(
     const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) {
   try {
     return sampledPoses(device_, context_, bank, plays);
+  } catch (const Failure& failure) {
+    return failure.error();
+  }
+}
+
+Result<std::vector<DrivenPose>> VulkanTarget::drivePoses(const PackedRig& rig,
+                                                         std::span<const RigInput> inputs) {
+  try {
+    return drivenPoses(device_, context_, rig, inputs);
   } catch (const Failure& failure) {
     return failure.error();
   }

@@ -139,21 +139,18 @@ double shareOfBounds(const reference::EvaluatedRig& right, const Driven& found) 
 
 TEST_F(RigOnDevice, DrivesWhatTheReferenceDoesWithinItsBounds) {
   const auto source = riggedSource();
-  const RigHandle handle = must(scene().addRig(must(packRig(source->view))));
-  std::vector<PoseHandle> poses;
-  std::vector<Pose> written;
-  const std::array<float, givenWeights> given{0.5f, -0.25f};
-  for (std::uint32_t seed = 0; seed < 70; ++seed) {  // more than a workgroup
-    written.push_back(systemPose(seed, riggedJoints));
-    poses.push_back(addRigged(handle, written.back(), given));
-    engine().addInstance(riggedInstance(poses.back(), Method::dualQuaternion));
-  }
-  runFrame();
+  std::vector<samples::RigInput> inputs;
+  for (std::uint32_t seed = 0; seed < 70; ++seed)  // more than a workgroup
+    inputs.push_back({systemPose(seed, riggedJoints), {0.5f, -0.25f}});
+  // As `dermis verify` does.
+  samples::VulkanTarget target(*open_->device, open_->context);
+  const std::vector<Driven> driven = must(target.drivePoses(must(packRig(source->view)), inputs));
+  ASSERT_EQ(driven.size(), inputs.size());
   double worst = 0;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const auto& [written, given] = inputs[i];
     const double share =
-        shareOfBounds(must(reference::evaluateRig(source->view, written[i], given)),
-                      engine().readDriven(poses[i]));
+        shareOfBounds(must(reference::evaluateRig(source->view, written, given)), driven[i]);
     EXPECT_LE(share, 1) << "pose " << i;
     worst = std::max(worst, share);
   }

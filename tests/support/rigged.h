@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dermis/rig.h"
+#include "kit/batch_runner.h"
 
 namespace dermis::test {
 
@@ -49,11 +50,7 @@ inline constexpr std::uint32_t smallWritten = 5;
 /// One whose linear driver has so many terms, of 64 bytes.
 PackedRig longRig(std::uint32_t terms);
 
-/// What a rig drives.
-struct Driven {
-  std::vector<JointMatrix> joints;
-  std::vector<float> weights;  ///< all
-};
+using Driven = samples::DrivenPose;
 Driven evaluated(const PackedRig& rig, std::span<const JointMatrix> written,
                  std::span<const float> given);
 
