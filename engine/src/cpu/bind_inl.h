@@ -58,15 +58,16 @@ inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block,
   return from;
 }
 
-/// Adds the displacements of a target to all vertices of a block. `components`: positions, then
-/// normals and tangents if the target displaces them; null if not wanted.
-inline HWY_ATTR void displaceAll(const Displacements& displacements, float weight,
+/// Adds displacements of all vertices of a block. `components`: those that the target displaces,
+/// positions before normals before tangents; null if not wanted.
+inline HWY_ATTR void displaceAll(const std::uint32_t* words,
+                                 const BlockDisplacements& displacements,
                                  Lanes* const* components) {
   const Wide d;
-  const Vec<Wide> w = hn::Set(d, weight);
+  const Vec<Wide> w = hn::Set(d, displacements.weight);
   const std::size_t size = displacements.size;
   for (std::size_t lane = 0; lane < blockVertices; lane += hn::MaxLanes(d)) {
-    const auto* const from = reinterpret_cast<const float*>(displacements.words) + lane * size;
+    const auto* const from = reinterpret_cast<const float*>(words) + lane * size;
     const auto add = [&](std::size_t component, Vec<Wide> value) HWY_ATTR {
       if (components[component] == nullptr) return;
       float* const to = components[component]->v + lane;
@@ -80,57 +81,55 @@ inline HWY_ATTR void displaceAll(const Displacements& displacements, float weigh
       add(2, z);
       continue;
     }
-    // Four components at a time. The last four may begin with some that were added before.
-    for (std::size_t done = 0; done < size;) {
-      const std::size_t first = std::min(done, size - 4);
-      const Vec4<Wide> rows = loadRows(d, from + first, size);
-      const Vec<Wide> four[4] = {rows.x, rows.y, rows.z, rows.w};
-      for (; done < first + 4; ++done) add(done, four[done - first]);
-    }
-  }
-}
-
-inline HWY_ATTR void morphBlocks(const MeshData& mesh, std::uint32_t firstBlock,
-                                 std::uint32_t blockEnd, std::span<const MorphWeight> morphs,
-                                 const abi::MorphRecord* targets, MorphedBlock* blocks) {
-  Lanes* const noLanes = nullptr;
-  for (std::size_t i = 0; i < morphs.size(); ++i) {
-    const abi::MorphRecord& target = targets[i];
-    const float weight = morphs[i].weight;
-    const std::uint32_t first = firstBlock * blockVertices / abi::MORPH_BLOCK_VERTICES;
-    const std::uint32_t last = (blockEnd * blockVertices - 1) / abi::MORPH_BLOCK_VERTICES;
-    if (weight == 0 || last < target.firstBlock || first >= target.firstBlock + target.blockCount)
+    const Vec4<Wide> first = loadRows(d, from, size), last = loadRows(d, from + size - 4, size);
+    add(0, first.x);
+    add(1, first.y);
+    add(2, first.z);
+    add(3, first.w);
+    if (size == 6) {  // the last four begin with two of the first
+      add(4, last.z);
+      add(5, last.w);
       continue;
-    for (std::uint32_t number = firstBlock; number < blockEnd; ++number) {
-      const Displacements found = displacementsOf(mesh, target, number);
-      if (found.mask == 0) continue;
-      MorphedBlock& block = blocks[number - firstBlock];
-      Lanes* const normals = mesh.normals.empty() ? noLanes : block.normals;
-      Lanes* const tangents = mesh.tangents.empty() ? noLanes : block.tangents;
-      if (found.mask != 0xff) {
-        displace(found, target.attributes, weight, block.positions, normals, tangents);
-        continue;
-      }
-      Lanes* components[9];
-      std::size_t count = 0;
-      for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, block.positions},
-                                             {abi::MORPH_HAS_NORMALS, normals},
-                                             {abi::MORPH_HAS_TANGENTS, tangents}}) {
-        if ((target.attributes & attribute) == 0) continue;
-        for (std::size_t k = 0; k < 3; ++k)
-          components[count++] = lanes == nullptr ? nullptr : lanes + k;
-      }
-      displaceAll(found, weight, components);
     }
+    add(4, loadRows(d, from + 4, size).x);
+    add(5, last.x);
+    add(6, last.y);
+    add(7, last.z);
+    add(8, last.w);
   }
 }
 
-/// Morphs the blocks of a tile for instances that have active targets. `targets`: those of the
-/// first instance, then those of the others.
+inline HWY_ATTR void morphBlock(const MeshData& mesh, std::uint32_t number, ActiveTargets& active,
+                                MorphedBlock& block) {
+  active.find(mesh, number * blockVertices / abi::MORPH_BLOCK_VERTICES);
+  Lanes* const noLanes = nullptr;
+  Lanes* const normals = mesh.normals.empty() ? noLanes : block.normals;
+  Lanes* const tangents = mesh.tangents.empty() ? noLanes : block.tangents;
+  for (const BlockDisplacements& displacements : active.displacements) {
+    const Displacements part = partOf(displacements, number);
+    if (part.mask == 0) continue;
+    if (part.mask != 0xff) {
+      displace(part, displacements, block.positions, normals, tangents);
+      continue;
+    }
+    Lanes* components[9];
+    std::size_t count = 0;
+    for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, block.positions},
+                                           {abi::MORPH_HAS_NORMALS, normals},
+                                           {abi::MORPH_HAS_TANGENTS, tangents}}) {
+      if ((displacements.attributes & attribute) == 0) continue;
+      for (std::size_t k = 0; k < 3; ++k)
+        components[count++] = lanes == nullptr ? nullptr : lanes + k;
+    }
+    displaceAll(part.words, displacements, components);
+  }
+}
+
+/// Morphs the blocks of a tile for instances that have active targets.
 template <bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t firstBlock,
-                                     std::uint32_t blockEnd, const TaskInstance* const* instances,
-                                     const abi::MorphRecord* targets, Tile<D>& tile, Source& from) {
+                                     std::uint32_t blockEnd, ActiveTargets* active, Tile<D>& tile,
+                                     Source& from) {
   const auto scatter = [&](const Lanes& lanes, std::size_t unit, std::size_t i, Vec<D>* to) {
     // The memory of a vector is its lanes, in order.
     auto* const memory = reinterpret_cast<std::byte*>(to);
@@ -154,10 +153,8 @@ HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t fi
         std::copy_n(mesh.givenTangents.data() + number * 4, 3, block.tangents);
         block.tangents[3] = mesh.tangents[number * 4 + 3];
       }
+      morphBlock(mesh, firstBlock + static_cast<std::uint32_t>(k), active[i], block);
     }
-    const std::span<const MorphWeight> morphs = instances[i]->morphs;
-    morphBlocks(mesh, firstBlock, blockEnd, morphs, targets, tile.blocks);
-    targets += morphs.size();
     for (std::size_t unit = 0; unit < units; ++unit) {
       const MorphedBlock& block = tile.blocks[unit / unitsEach];
       for (std::size_t c = 0; c < 3; ++c) {

@@ -64,13 +64,9 @@ template <bool isLone, class D>
 inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& palette,
                                   const TaskInstance* const* instances) {
   constexpr std::size_t count = isLone ? 1 : blocksOf<D>;
-  std::vector<abi::MorphRecord>& targets = part.scratch[0].targets;
-  targets.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    for (const MorphWeight& morph : instances[i]->morphs)
-      targets.push_back(morphTarget(*part.task.mesh, morph.target));
-  }
-  const Company company{part.task, instances, count, palette, targets.data()};
+  for (std::size_t i = 0; i < count; ++i)
+    part.scratch[0].morphs[i].begin(*part.task.mesh, instances[i]->morphs);
+  const Company company{part.task, instances, count, palette, part.scratch[0].morphs.data()};
   Findings<D> findings(d);
   // Not on the stack: an engine's fibers may have little of it.
   auto& tile = *new (floatsOf(part.scratch[0].tile, sizeof(Tile<D>) / sizeof(float))) Tile<D>;

@@ -7,23 +7,24 @@
 
 namespace dermis::cpu {
 
-abi::MorphRecord morphTarget(const MeshData& mesh, std::uint32_t target) {
+ActiveTarget activeTarget(const MeshData& mesh, const MorphWeight& morph) {
   const std::span<const std::uint32_t> words(mesh.packed);
   const auto header = abi::load<abi::MeshHeader>(words, 0);
-  return abi::load<abi::MorphRecord>(words, header.morphs + std::size_t{target} * abi::MORPH_WORDS);
+  const std::size_t place = header.morphs + std::size_t{morph.target} * abi::MORPH_WORDS;
+  return {abi::load<abi::MorphRecord>(words, place), morph.weight};
 }
 
-void displace(const Displacements& displacements, std::uint32_t attributes, float weight,
-              Lanes* positions, Lanes* normals, Lanes* tangents) {
-  const std::uint32_t* word = displacements.words;
-  for (std::uint32_t mask = displacements.mask; mask != 0; mask &= mask - 1) {
+void displace(const Displacements& part, const BlockDisplacements& displacements, Lanes* positions,
+              Lanes* normals, Lanes* tangents) {
+  const std::uint32_t* word = part.words;
+  for (std::uint32_t mask = part.mask; mask != 0; mask &= mask - 1) {
     const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
     for (const auto& [attribute, lanes] : {std::pair{abi::MORPH_HAS_POSITIONS, positions},
                                            {abi::MORPH_HAS_NORMALS, normals},
                                            {abi::MORPH_HAS_TANGENTS, tangents}}) {
-      if ((attributes & attribute) == 0) continue;
+      if ((displacements.attributes & attribute) == 0) continue;
       for (std::size_t k = 0; lanes != nullptr && k < 3; ++k)
-        lanes[k].v[lane] += weight * std::bit_cast<float>(word[k]);
+        lanes[k].v[lane] += displacements.weight * std::bit_cast<float>(word[k]);
       word += 3;
     }
   }

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "abi.h"
 #include "cpu/mesh_data.h"
@@ -12,39 +14,83 @@
 
 namespace dermis::cpu {
 
-/// The record of a target.
-abi::MorphRecord morphTarget(const MeshData& mesh, std::uint32_t target);
+/// A target with a weight other than 0.
+struct ActiveTarget {
+  abi::MorphRecord record;
+  float weight;
+};
 
-/// What a target displaces of eight vertices.
-struct Displacements {
-  std::uint32_t mask = 0;  ///< one bit for each vertex
+ActiveTarget activeTarget(const MeshData& mesh, const MorphWeight& morph);
+
+/// What a target displaces of the vertices of a mesh, `abi::MORPH_BLOCK_VERTICES` of them.
+struct BlockDisplacements {
+  std::uint64_t mask = 0;  ///< one bit for each vertex
   /// Those of the first displaced vertex; those of the others follow. Each has three floats for
   /// each attribute of the target.
   const std::uint32_t* words = nullptr;
   std::size_t size = 0;  ///< words for each vertex
+  std::uint32_t attributes = 0;
+  float weight = 0;
 };
 
-/// Those of a block. Inline, so that the code of an instruction set counts bits by its own.
-inline Displacements displacementsOf(const MeshData& mesh, const abi::MorphRecord& target,
-                                     std::uint32_t block) {
-  const std::uint32_t vertex = block * blockVertices;
-  const std::uint32_t number = vertex / abi::MORPH_BLOCK_VERTICES - target.firstBlock;
-  if (number >= target.blockCount) return {};  // a block before the first one wraps around
+/// Those of block `number`, or nothing. Inline, so that the code of an instruction set counts bits
+/// by its own.
+inline std::optional<BlockDisplacements> displacementsOf(const MeshData& mesh,
+                                                         const ActiveTarget& active,
+                                                         std::uint32_t number) {
+  const auto& [target, weight] = active;
+  const std::uint32_t place = number - target.firstBlock;
+  if (place >= target.blockCount) return {};  // a block before the first one wraps around
   const auto record = abi::load<abi::MorphBlockRecord>(
-      mesh.packed, target.blocks + std::size_t{number} * abi::MORPH_BLOCK_WORDS);
+      mesh.packed, target.blocks + std::size_t{place} * abi::MORPH_BLOCK_WORDS);
   const std::uint64_t mask = record.maskLow | std::uint64_t{record.maskHigh} << 32;
-  const std::uint32_t shift = vertex % abi::MORPH_BLOCK_VERTICES;
-  if ((mask >> shift & 0xff) == 0) return {};
-  const auto before =
-      static_cast<std::size_t>(std::popcount(mask & ((std::uint64_t{1} << shift) - 1)));
+  if (mask == 0) return {};
   const std::size_t size = static_cast<std::size_t>(std::popcount(target.attributes)) * 3;
-  return {static_cast<std::uint32_t>(mask >> shift & 0xff),
-          mesh.packed.data() + record.displacements + before * size, size};
+  return BlockDisplacements{mask, mesh.packed.data() + record.displacements, size,
+                            target.attributes, weight};
 }
 
-/// Adds them to a block, times `weight`. `positions`, `normals` and `tangents` have three
-/// components each; null if not wanted.
-void displace(const Displacements& displacements, std::uint32_t attributes, float weight,
-              Lanes* positions, Lanes* normals, Lanes* tangents);
+/// What the active targets of an instance displace of the vertices that were asked for last.
+struct ActiveTargets {
+  std::vector<ActiveTarget> all;  ///< in ascending order
+  std::uint32_t number = 0;       ///< of the block
+  std::vector<BlockDisplacements> displacements;
+
+  void begin(const MeshData& mesh, std::span<const MorphWeight> morphs) {
+    number = ~std::uint32_t{0};
+    all.clear();
+    for (const MorphWeight& morph : morphs) {
+      if (morph.weight != 0) all.push_back(activeTarget(mesh, morph));
+    }
+  }
+  void find(const MeshData& mesh, std::uint32_t block) {
+    if (block == number) return;
+    number = block;
+    displacements.clear();
+    for (const ActiveTarget& target : all) {
+      if (const auto found = displacementsOf(mesh, target, block)) displacements.push_back(*found);
+    }
+  }
+};
+
+/// The part of it that displaces eight vertices.
+struct Displacements {
+  std::uint32_t mask;  ///< one bit for each vertex
+  const std::uint32_t* words;
+};
+
+/// Those of a block of the CPU path's mesh.
+inline Displacements partOf(const BlockDisplacements& displacements, std::uint32_t block) {
+  const std::uint32_t shift = block * blockVertices % abi::MORPH_BLOCK_VERTICES;
+  const std::uint64_t before = displacements.mask & ((std::uint64_t{1} << shift) - 1);
+  return {
+      static_cast<std::uint32_t>(displacements.mask >> shift & 0xff),
+      displacements.words + static_cast<std::size_t>(std::popcount(before)) * displacements.size};
+}
+
+/// Adds them to a block. `positions`, `normals` and `tangents` have three components each; null if
+/// not wanted.
+void displace(const Displacements& part, const BlockDisplacements& displacements, Lanes* positions,
+              Lanes* normals, Lanes* tangents);
 
 }  // namespace dermis::cpu

@@ -29,7 +29,7 @@ struct Company {
   const TaskInstance* const* instances;
   std::size_t count;
   const Palette& palette;
-  const abi::MorphRecord* targets;  ///< the active ones of all instances, one after the other
+  ActiveTargets* morphs;  ///< of each instance
   Records records = recordsOf(task.places, instances, count);
   bool isMorphed = !instances[0]->morphs.empty();
   bool isSideBySide = areSideBySide(task.places, instances, count);
@@ -150,8 +150,7 @@ inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
                     units, tile);
   Source from = sourceOf(mesh, task.method, blocks.first, isLone);
   if (company.isMorphed) {
-    morphTile<isLone>(d, mesh, blocks.first, blocks.end, company.instances, company.targets, tile,
-                      from);
+    morphTile<isLone>(d, mesh, blocks.first, blocks.end, company.morphs, tile, from);
   }
   skinByMethod<isLone>(d, task, company.palette, from, units, tile);
   if (company.hasResults) findBounds<isLone>(d, tile, units, range, findings);

@@ -10,6 +10,7 @@
 
 #include "clips/sample.h"
 #include "cpu/mesh_data.h"
+#include "cpu/morph.h"
 #include "dermis/cpu.h"
 #include "dermis/rig.h"
 
@@ -27,7 +28,7 @@ struct Scratch {
   std::vector<CacheLine> rows;             ///< of joints: 3×4, and four zeros
   std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
-  std::vector<abi::MorphRecord> targets;   ///< the active ones of each instance
+  std::array<ActiveTargets, 4> morphs;     ///< of each of the instances
   std::vector<CacheLine> tile;             ///< what the stages hand to each other
 };
 
