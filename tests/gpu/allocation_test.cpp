@@ -4,20 +4,37 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>
+#include <future>
 #include <new>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "dermis/cpu.h"
 #include "kit/device.h"
+#include "played_clips.h"
+#include "rigged.h"
 #include "system_test.h"
 
 namespace {
 
 thread_local bool isCounting = false;
 thread_local std::uint32_t allocations = 0;
+thread_local std::uint32_t allowed = ~0u;  ///< so many more; then there is no memory
+
+void spend() {
+  if (isCounting) ++allocations;
+  if (allowed == 0) throw std::bad_alloc();
+  if (allowed != ~0u) --allowed;
+}
 
 void* allocate(std::size_t size) {
-  if (isCounting) ++allocations;
+  spend();
   if (void* const memory = std::malloc(size != 0 ? size : 1)) return memory;
   std::abort();
 }
@@ -36,7 +53,7 @@ void* operator new(std::size_t size) {
 }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto multiple = static_cast<std::size_t>(alignment);
-  if (isCounting) ++allocations;
+  spend();
   return std::aligned_alloc(multiple, (size + multiple - 1) / multiple * multiple);
 }
 void operator delete(void* memory, std::align_val_t) noexcept {
@@ -243,6 +260,91 @@ TEST(CpuAllocationTest, WarmJobsAllocateNothing) {
       EXPECT_EQ(allocations, 0u) << methodName(method);
     }
   }
+}
+
+/// Runs a job in a thread of its own, which has no working memory yet. Returns whether there was
+/// enough memory.
+bool runInNewThread(const cpu::PlannedJob& job, std::uint32_t allocationsAllowed) {
+  std::packaged_task<bool()> run([&] {
+    allowed = allocationsAllowed;
+    try {
+      cpu::skin(job);
+      allowed = ~0u;
+      return true;
+    } catch (const std::bad_alloc&) {
+      allowed = ~0u;
+      return false;
+    }
+  });
+  std::future<bool> done = run.get_future();
+  std::thread thread(std::move(run));
+  if (done.wait_for(std::chrono::minutes(1)) != std::future_status::ready) {
+    std::fprintf(stderr, "the job waits for what nobody does any more\n");
+    std::abort();
+  }
+  thread.join();
+  return done.get();
+}
+
+/// A bank with a skin of eight joints, which needs more working memory than `playedClips`.
+PackedClips longClips() {
+  constexpr std::array<float, 2> times{0, 1};
+  constexpr std::array<float, 8> turns{0, 0, 0, 1, 0, 0.6f, 0, 0.8f};
+  constexpr std::uint32_t nodes = 300;
+  Skeleton skeleton;
+  ClipView clip{.name = "clip", .duration = 1, .wraps = false};
+  for (std::uint32_t node = 0; node < nodes; ++node) {
+    skeleton.nodes.push_back({.translation = {0, 0.1, 0}});
+    if (node > 0) skeleton.nodes.back().parent = 0;
+    clip.channels.push_back(
+        {.node = node, .path = ChannelPath::rotation, .times = times, .values = turns});
+  }
+  const std::array<std::uint32_t, riggedJoints> joints{0, 1, 2, 3, 4, 5, 6, nodes - 1};
+  const std::vector<JointMatrix> inverseBind(joints.size());
+  skeleton.skins = {{"skin", joints, inverseBind}};
+  return must(packClips(skeleton, {&clip, 1}));
+}
+
+// What the first of several jobs finds, the others wait for. If it has no memory for that, another
+// one must be able to do it.
+TEST(CpuAllocationTest, AJobWithoutMemoryCanBeRunAgain) {
+  const std::vector<std::string_view> targets = cpu::targetNames();
+  for (const std::string_view target : {targets.front(), targets.back()}) {
+    must(cpu::setTarget(target));
+    cpu::SceneRunner runner = must(cpu::SceneRunner::create());
+    Scene& scene = runner.scene();
+    const std::array banks{must(scene.addClips(PackedClips(playedClips()))),
+                           must(scene.addClips(longClips()))};
+    const RigHandle rig = must(scene.addRig(riggedPose(6, 0)));
+    InstanceDescription instance;
+    instance.mesh = must(scene.addMesh(systemMesh(1, 50)));
+    instance.layout = plainLayout();
+    std::vector<FigureHandle> figures;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const std::array rigs{rig, rig};
+      figures.push_back(
+          must(scene.addFigure(banks[i % 2], std::span(rigs).first(i % 2 == 0 ? 2 : 1))));
+      instance.pose = must(scene.pose(figures[i]));
+      must(scene.addInstance(instance));
+    }
+    bool isEnough = false;
+    std::uint32_t frame = 0;
+    for (std::uint32_t given = 0; !isEnough; ++given) {
+      must(scene.beginFrame(frame + 1, frame));
+      ++frame;
+      for (const FigureHandle figure : figures) {
+        const ClipLayer layer{.time = 0.01 * frame};
+        const FigurePlay play{figure, {&layer, 1}};
+        must(scene.play({&play, 1}));
+      }
+      const auto jobs = must(runner.jobs(1));
+      ASSERT_GT(jobs.size(), 1u);
+      isEnough = runInNewThread(jobs[0], given);
+      for (const cpu::PlannedJob& job : jobs) EXPECT_TRUE(runInNewThread(job, ~0u));
+    }
+    EXPECT_GT(frame, 5u) << target;
+  }
+  must(cpu::setTarget(""));
 }
 
 }  // namespace

@@ -27,14 +27,23 @@ void RigTask::finish() {
       if (figure != nullptr) {
         figure->finish();
         const PackedClips& bank = *figure->plan->bank;
-        if (const auto node = ClipBank(bank).morphedNode(rig->weightsOf()))
-          sampleWeights(bank, figure->layers, *node, pose.weights.first(rig->givenWeights()));
+        const std::span given = pose.weights.first(rig->givenWeights());
+        if (!given.empty()) {
+          const auto node = ClipBank(bank).morphedNode(rig->weightsOf());
+          sampleWeights(bank, figure->layers, *node, given);
+        }
       }
       std::ranges::copy(pose.written, pose.driven.data() - pose.written.size());
     }
     dispatchRigs(*rig, std::span(poses).first(count), scratch);
   };
-  work.finish([&] { scratch.prepare(*rig); }, evaluate);
+  const auto prepare = [&] {
+    scratch.prepare(*rig);
+    for (const FigureTask* figure : std::span(figures).first(count)) {
+      if (figure != nullptr) threadMemory().clips.prepare(*figure->plan);
+    }
+  };
+  work.finish(prepare, evaluate);
 }
 
 void RigScratch::prepare(const PackedRig& rig) {
@@ -44,11 +53,10 @@ void RigScratch::prepare(const PackedRig& rig) {
   if (numbers.size() < count) numbers.resize(count);
 }
 
-void evaluatePlainly(const PackedRig& rig, std::span<const RigPose> poses, RigScratch&) {
+void evaluatePlainly(const PackedRig& rig, std::span<const RigPose> poses, RigScratch& scratch) {
   for (const RigPose& pose : poses) {
-    // The sizes fit.
-    static_cast<void>(
-        evaluateRig(rig, pose.written, pose.givenWeights, pose.driven, pose.weights).ok());
+    evaluateRigIn(&scratch.numbers[0].v[0], rig, pose.written, pose.givenWeights, pose.driven,
+                  pose.weights);
   }
 }
 

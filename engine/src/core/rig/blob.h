@@ -139,6 +139,13 @@ struct RigBlob {
   }
 };
 
+/// As `evaluateRig`, with memory of the caller, four floats for each of `RigHeader::mostInputs`. The
+/// sizes are those that the rig says.
+DERMIS_CORE_API void evaluateRigIn(float* scratch, const PackedRig& rig,
+                                   std::span<const JointMatrix> written,
+                                   std::span<const float> givenWeights,
+                                   std::span<JointMatrix> driven, std::span<float> weights);
+
 /// Checks the length, the version, the checksum, every offset and index, and that numbers are
 /// finite and drivers read what is computed before.
 Result<void> checkRig(std::span<const std::uint32_t> words);

@@ -63,11 +63,21 @@ Result<void> checkSize(std::size_t size, std::size_t expected, const char* what)
 
 }  // namespace
 
+void evaluateRigIn(float* scratch, const PackedRig& rig, std::span<const JointMatrix> written,
+                   std::span<const float> givenWeights, std::span<JointMatrix> driven,
+                   std::span<float> weights) {
+  const RigBlob blob(rig);
+  std::ranges::copy(givenWeights, weights.begin());
+  std::array<float, maxRigExamples> basis{};
+  const std::span rotations(reinterpret_cast<rigs::Quat<float>*>(scratch), blob.header.mostInputs);
+  rigs::PoseMemory memory{written, driven, weights};
+  rigs::evaluateDrivers<float>(blob, rotations, std::span<float>(basis), memory);
+}
+
 Result<void> evaluateRig(const PackedRig& rig, std::span<const JointMatrix> written,
                          std::span<const float> givenWeights, std::span<JointMatrix> driven,
                          std::span<float> weights) {
-  const RigBlob blob(rig);
-  const RigHeader& header = blob.header;
+  const RigHeader header = RigBlob(rig).header;
   Result<void> good = checkSize(written.size(), header.writtenJoints, "written joints");
   if (good) good = checkSize(givenWeights.size(), header.givenWeights, "given weights");
   if (good) good = checkSize(driven.size(), header.drivenJoints, "driven joints");
@@ -75,15 +85,11 @@ Result<void> evaluateRig(const PackedRig& rig, std::span<const JointMatrix> writ
     good = checkSize(weights.size(), std::size_t{header.givenWeights} + header.drivenWeights,
                      "weights in all");
   if (!good) return good;
-  std::ranges::copy(givenWeights, weights.begin());
-  std::array<float, maxRigExamples> basis{};
   // Most correctives read one joint, which needs no memory.
-  rigs::Quat<float> one{};
-  std::vector<rigs::Quat<float>> many(header.mostInputs > 1 ? header.mostInputs : 0);
-  const std::span<rigs::Quat<float>> rotations =
-      many.empty() ? std::span(&one, header.mostInputs) : std::span(many);
-  rigs::PoseMemory memory{written, driven, weights};
-  rigs::evaluateDrivers<float>(blob, rotations, std::span<float>(basis), memory);
+  std::array<float, 4> one{};
+  std::vector<float> many(header.mostInputs > 1 ? header.mostInputs * std::size_t{4} : 0);
+  evaluateRigIn(many.empty() ? one.data() : many.data(), rig, written, givenWeights, driven,
+                weights);
   return {};
 }
 
