@@ -181,7 +181,8 @@ void SceneBooks::gatherCulled() {
     std::uint32_t version = instance.version;
     const bool isNew = version == 0 || actionOf(state, instance.pose, state.need) >= Action::skin;
     if (isNew) {
-      version = ++nextVersion_;
+      nextVersion_ = std::max(nextVersion_ + 1, 1u);
+      version = nextVersion_;
       versioned_.push_back({index, version});
     }
     // There is no box until the GPU skins it for the first time, and the CPU does not know when
@@ -660,8 +661,9 @@ void SceneBooks::readHistory(std::span<const std::byte> records) {
     if (instance.isWritten || !instance.shown || place >= records.size()) continue;
     abi::HistoryRecord record;
     std::memcpy(&record, records.data() + place, sizeof(record));
-    instance.isWritten = record.version != 0 &&
-                         static_cast<std::int32_t>(record.version - instance.firstVersion) >= 0;
+    // From `firstVersion` to the newest, if there is one yet.
+    instance.isWritten = record.version != 0 && record.version - instance.firstVersion <
+                                                    nextVersion_ + 1 - instance.firstVersion;
   }
 }
 
