@@ -130,6 +130,41 @@ TEST_F(CpuSceneRigTest, FiguresMayHaveRigs) {
   }
 }
 
+TEST_F(CpuSceneRigTest, AFigureNeedsThePipelinesOfAllItsRigs) {
+  const ClipsHandle bank = must(engine_->addClips(PackedClips(playedClips())));
+  const RigHandle handle = must(engine_->addRig(riggedPose(6, 0)));
+  const auto needsRigs = [&](std::span<const RigHandle> rigs, std::uint32_t skin) {
+    const FigureHandle figure = must(engine_->addFigure(bank, rigs));
+    const InstanceDescription instance{
+        .mesh = mesh_, .pose = must(engine_->pose(figure, skin)), .layout = plainLayout()};
+    return must(engine_->pipelineNeeds(instance)).rigs;
+  };
+  // The skin without a rig is sampled together with the other one.
+  EXPECT_TRUE(needsRigs(std::array{RigHandle(), handle}, 0));
+  EXPECT_TRUE(needsRigs(std::array{RigHandle(), handle}, 1));
+  EXPECT_FALSE(needsRigs({}, 0));
+}
+
+TEST_F(CpuSceneRigTest, ARigThatReadsNoWeightsMayNameANodeThatHasSome) {
+  const PackedRig rig = riggedPose(6, 0, weightedNode(4));
+  const ClipsHandle bank = must(engine_->addClips(PackedClips(playedClips())));
+  const RigHandle handle = must(engine_->addRig(PackedRig(rig)));
+  std::vector<FigureHandle> figures;
+  std::vector<Pair> pairs;
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    figures.push_back(must(engine_->addFigure(bank, std::array{RigHandle(), handle})));
+    pairs.push_back(add(must(engine_->pose(figures[i], 1)), Method::dualQuaternion));
+  }
+  engine_.begin();
+  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+    const FigurePlay played{figures[i], playedLayers(i)};
+    must(engine_->play({&played, 1}));
+    writePlain(pairs[i], rig, playedPose(i, 1), {}, {});
+  }
+  engine_.submit();
+  for (const Pair& pair : pairs) expectAlike(pair);
+}
+
 TEST_F(CpuSceneRigTest, AnAbandonedFrameIsDrivenAgain) {
   const PackedRig rig = riggedPose(3);
   const RigHandle handle = must(engine_->addRig(PackedRig(rig)));

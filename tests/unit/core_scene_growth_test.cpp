@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
 #include "planned_scene.h"
+#include "played_clips.h"
+#include "rigged.h"
 
 namespace dermis::test {
 namespace {
@@ -129,6 +132,27 @@ TEST_F(SceneGrowthTest, WhatWouldLieInTwoRangesStaysWhereItIs) {
   const MorphWeight morph{0, 1};
   const InstanceChange change{.instance = *culled, .morphs = std::span(&morph, 1)};
   EXPECT_TRUE(scene->change(change).ok()) << "it is skinned to where it is";
+}
+
+// Whatever frames are in flight.
+TEST_F(SceneGrowthTest, FiguresAndPosesThatAreRefusedTakeNothing) {
+  description.scene.gpuJointCapacity = Capacity::fixed(playedSkins * 8 + 4);
+  create();
+  const ClipsHandle clips = scene->addClips(PackedClips(playedClips())).value();
+  const RigHandle rig = scene->addRig(riggedPose(1, 0)).value();
+  ASSERT_TRUE(scene->beginFrame(1, 0).ok());
+  const std::uint64_t used = scene->statistics().palettes.used;
+  expectRefused(scene->addFigure(clips, std::array{RigHandle(), rig}), ErrorCode::limitExceeded,
+                "joints");
+  EXPECT_EQ(scene->statistics().palettes.used, used);
+  const Result<FigureHandle> figure = scene->addFigure(clips);
+  ASSERT_TRUE(figure.ok()) << figure.error().message;
+  ASSERT_TRUE(scene->removeFigure(*figure).ok());
+  ASSERT_TRUE(scene->beginFrame(2, 1).ok());
+  std::array<PoseHandle, 2> poses;
+  expectRefused(scene->addPoses(poses, riggedJoints, {.writtenByGpu = true, .rig = rig}),
+                ErrorCode::limitExceeded, "joints");
+  EXPECT_TRUE(scene->addPoses(poses, riggedJoints, {.writtenByGpu = true}).ok());
 }
 
 TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereTheyAreAdded) {

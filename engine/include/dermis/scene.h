@@ -320,8 +320,8 @@ class DERMIS_CORE_API Scene {
   Result<PoseHandle> addPose(std::uint32_t jointCount, const PoseOptions& options = {});
   /// Adds one pose for each element of `poses`, and writes the handles there. Poses that the GPU
   /// writes are consecutive in one buffer: each begins `jointCount` matrices after the one before
-  /// it, and the first at a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`. If it
-  /// fails, it adds none.
+  /// it, plus one for every twelve given weights of its rig, rounded up. The first begins at a
+  /// multiple of `DeviceLimits::minStorageBufferOffsetAlignment`. If it fails, it adds none.
   Result<void> addPoses(std::span<PoseHandle> poses, std::uint32_t jointCount,
                         const PoseOptions& options = {});
   /// Fails with `invalidArgument` if an instance uses the pose, or if it belongs to a figure.

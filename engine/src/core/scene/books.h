@@ -325,7 +325,7 @@ struct SceneBooks {
   Result<void> mayWrite() const;
   Result<void> checkWrite(PoseHandle handle, bool writtenByGpu) const;
   void markWritten(ScenePose& pose, PoseHandle handle);
-  void dropPose(PoseHandle handle);
+  void dropPose(PoseHandle handle, bool isNew = false);
   /// Where the matrices of the current slot are in the buffer of the pose.
   std::uint64_t offsetOf(const ScenePose& pose) const {
     return (pose.joints.offset + std::uint64_t{pose.slot} * pose.slotJoints) * sizeof(JointMatrix);
@@ -349,7 +349,7 @@ struct SceneBooks {
 
   // rigs.cpp
   Result<void> takeDriven(ScenePose& pose, std::uint32_t rig);
-  void releaseDriven(const ScenePose& pose);
+  void releaseDriven(const ScenePose& pose, bool isNew);
   void driveRig(std::uint32_t pose, std::uint32_t figure);
   std::uint64_t drivenWord(const ScenePose& pose, std::uint32_t weight) const;
   std::uint32_t drivenTargetsOf(const SceneInstance& instance) const;
@@ -370,6 +370,7 @@ struct SceneBooks {
     return {&meshStore_.buffer, &outputStore_.buffer, &resultStore_.buffer, &history_};
   }
   void retire(RangeAllocator& store, const Range& range);
+  void giveBack(RangeAllocator& store, const Range& range, bool isNew);
   void retire(const SceneBufferMemory& buffer);
   void freeRetired();
   PlanSizes sizes() const;

@@ -95,7 +95,7 @@ Result<FigureHandle> Scene::addFigure(ClipsHandle handle, std::span<const RigHan
     Result<std::optional<Range>> taken{std::optional<Range>(Range())};
     if (units != 0) taken = books.take(books.unitStore_, units, 1);
     if (!taken || !*taken) {
-      books.retire(books.poseBuffers_[figure.buffer].joints, figure.joints);
+      books.poseBuffers_[figure.buffer].joints.free(figure.joints);
       if (!taken) return taken.error();
       return SceneBooks::noRoom(
           "a figure needs " + std::to_string(units) + " units of 16 bytes of palettes",
@@ -118,9 +118,9 @@ Result<FigureHandle> Scene::addFigure(ClipsHandle handle, std::span<const RigHan
       isRigid = isRigid && rig.isRigid();
     }
     if (Result<void> taken = books.takeDriven(pose, pose.rig); !taken) {
-      for (const PoseHandle added : figure.poses) books.dropPose(added);
-      books.retire(books.poseBuffers_[figure.buffer].joints, figure.joints);
-      if (figure.matrices.size != 0) books.retire(books.unitStore_.ranges, figure.matrices);
+      for (const PoseHandle added : figure.poses) books.dropPose(added, true);
+      books.poseBuffers_[figure.buffer].joints.free(figure.joints);
+      if (figure.matrices.size != 0) books.unitStore_.ranges.free(figure.matrices);
       return taken.error();
     }
     pose.promise = isRigid ? JointPromise::rigid : JointPromise::scaling;

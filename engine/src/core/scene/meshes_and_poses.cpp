@@ -100,9 +100,8 @@ Result<void> Scene::addPoses(std::span<PoseHandle> poses, std::uint32_t jointCou
   for (std::size_t index = 0; index < poses.size(); ++index) {
     pose.joints = {(*joints)->offset + index * size, size};
     if (Result<void> taken = books.takeDriven(pose, pose.rig); !taken) {
-      for (const PoseHandle handle : poses.first(index)) books.dropPose(handle);
-      books.retire(books.poseBuffers_[pose.buffer].joints,
-                   {(*joints)->offset, size * poses.size()});
+      for (const PoseHandle handle : poses.first(index)) books.dropPose(handle, true);
+      books.poseBuffers_[pose.buffer].joints.free({(*joints)->offset, size * poses.size()});
       return taken;
     }
     poses[index] = books.poses_.add(pose);
@@ -127,10 +126,10 @@ Result<void> Scene::removePose(PoseHandle handle) {
   return {};
 }
 
-/// Of one that no instance uses. The caller retires its joints.
-void SceneBooks::dropPose(PoseHandle handle) {
+/// Of one that no instance uses. The caller retires its joints. `isNew`: no frame can have used it.
+void SceneBooks::dropPose(PoseHandle handle, bool isNew) {
   const ScenePose& pose = poses_.at(handle.index);
-  releaseDriven(pose);
+  releaseDriven(pose, isNew);
   for (std::size_t form = 0; form < paletteFormCount; ++form) {
     const std::uint32_t unit = pose.forms[form].unit;
     if (unit == notUsed) continue;

@@ -57,9 +57,9 @@ Result<void> SceneBooks::takeDriven(ScenePose& pose, std::uint32_t rig) {
   return {};
 }
 
-void SceneBooks::releaseDriven(const ScenePose& pose) {
+void SceneBooks::releaseDriven(const ScenePose& pose, bool isNew) {
   if (pose.rig == notUsed) return;
-  retire(poseBuffers_[pose.drivenBuffer].joints, pose.driven);
+  giveBack(poseBuffers_[pose.drivenBuffer].joints, pose.driven, isNew);
   --rigs_.at(pose.rig).users;
 }
 

@@ -179,7 +179,13 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
     if (pose == nullptr) return unknownHandle("pose", description.pose);
     needs.promise = pose->promise;
     needs.figures = pose->figure != notUsed;
-    needs.rigs = pose->rig != notUsed;
+    // A figure is sampled as a whole, and its rigs are evaluated with it.
+    needs.rigs = pose->figure == notUsed
+                     ? pose->rig != notUsed
+                     : std::ranges::any_of(books_->figures_.at(pose->figure).poses,
+                                           [this](PoseHandle own) {
+                                             return books_->poses_.at(own.index).rig != notUsed;
+                                           });
   }
   if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   return needs;

@@ -98,6 +98,15 @@ void SceneBooks::retire(RangeAllocator& store, const Range& range) {
   freeRetired();
 }
 
+/// `isNew`: no frame can have used it.
+void SceneBooks::giveBack(RangeAllocator& store, const Range& range, bool isNew) {
+  if (isNew) {
+    store.free(range);
+  } else {
+    retire(store, range);
+  }
+}
+
 void SceneBooks::retire(const SceneBufferMemory& buffer) {
   if (!buffer.exists()) return;
   retiredBuffers_.push_back({frame_, buffer.number});
