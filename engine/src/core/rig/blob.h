@@ -139,8 +139,8 @@ struct RigBlob {
   }
 };
 
-/// As `evaluateRig`, with memory of the caller, four floats for each of `RigHeader::mostInputs`. The
-/// sizes are those that the rig says.
+/// As `evaluateRig`, with memory of the caller, four floats for each of `RigHeader::mostInputs`.
+/// The sizes are those that the rig says.
 DERMIS_CORE_API void evaluateRigIn(float* scratch, const PackedRig& rig,
                                    std::span<const JointMatrix> written,
                                    std::span<const float> givenWeights,

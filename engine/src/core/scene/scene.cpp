@@ -180,12 +180,12 @@ Result<PipelineNeeds> Scene::pipelineNeeds(const InstanceDescription& descriptio
     needs.promise = pose->promise;
     needs.figures = pose->figure != notUsed;
     // A figure is sampled as a whole, and its rigs are evaluated with it.
-    needs.rigs = pose->figure == notUsed
-                     ? pose->rig != notUsed
-                     : std::ranges::any_of(books_->figures_.at(pose->figure).poses,
-                                           [this](PoseHandle own) {
-                                             return books_->poses_.at(own.index).rig != notUsed;
-                                           });
+    needs.rigs =
+        pose->figure == notUsed
+            ? pose->rig != notUsed
+            : std::ranges::any_of(books_->figures_.at(pose->figure).poses, [this](PoseHandle own) {
+                return books_->poses_.at(own.index).rig != notUsed;
+              });
   }
   if (const Result<VertexPlaces> good = checkNeeds(needs); !good) return good.error();
   return needs;
