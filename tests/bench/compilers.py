@@ -156,7 +156,9 @@ def intel(program, shim):
                 print("fails or spills: ", platform, kernel)
                 bad = True
             elif int(values["subgroup"]) < width:
-                halves[re.search(r"kernel for (\w+)", kernel)[1] + (", morph targets" if "morph" in kernel else "")] += 1
+                skin = re.search(r"kernel for (\w+)", kernel)
+                morphs = ", morph targets" if "morph targets" in kernel else ""
+                halves[skin[1] + morphs if skin else kernel.rpartition("; ")[2]] += 1
         bad |= not now
         wide = len(now) - halves.total()
         total += len(now)
