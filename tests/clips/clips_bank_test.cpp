@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 #include <random>
@@ -13,6 +16,7 @@
 #include <vector>
 
 #include "clip_rig.h"
+#include "clips/bank.h"
 #include "core_blob.h"
 #include "exhaustive.h"
 
@@ -237,6 +241,36 @@ TEST_F(ClipsBank, RandomChangesAreRefusedOrSafe) {
     const Result<PackedClips> result = PackedClips::fromBytes(other.bytes());
     if (result) samplePoses(*result);
     ASSERT_FALSE(HasFatalFailure()) << trial;
+  }
+}
+
+/// With so many skins, all of which have the joints of skin 0.
+Blob withSameSkins(const PackedClips& bank, std::uint32_t count) {
+  Blob blob(bank.bytes());
+  const BankHeader header = ClipBank(bank).header;
+  const auto skins = static_cast<std::uint32_t>(blob.size());
+  for (std::uint32_t i = 0; i < count * (sizeof(BankSkin) / 4); ++i)
+    blob.words().push_back(blob.word(header.skins + i % (sizeof(BankSkin) / 4)));
+  blob.words()[offsetof(BankHeader, skins) / 4] = skins;
+  blob.words()[offsetof(BankHeader, skinCount) / 4] = count;
+  blob.words()[header::wordCount] = static_cast<std::uint32_t>(blob.size());
+  blob.seal();
+  return blob;
+}
+
+// What a bank costs is bounded by its bytes.
+TEST_F(ClipsBank, ManySkinsCannotShareTheirJoints) {
+  EXPECT_TRUE(PackedClips::fromBytes(withSameSkins(bank(), 1).bytes()).ok());
+  expectRefused(withSameSkins(bank(), 1000).bytes());
+}
+
+TEST_F(ClipsBank, MasksAreFrom0To1) {
+  const std::uint32_t masks = ClipBank(bank()).header.masks;
+  for (const float factor : {-1.0f, 1.5f, 1e30f, std::nanf("")}) {
+    Blob other = blob();
+    other.words()[masks] = std::bit_cast<std::uint32_t>(factor);
+    other.seal();
+    expectRefused(other.bytes());
   }
 }
 

@@ -20,7 +20,7 @@ namespace {
 /// Clips of the rig below.
 constexpr std::uint32_t wave = 0, reach = 1, reachOnce = 2, addReach = 3, addWave = 4;
 /// Masks: factors of the hand and of all other nodes.
-constexpr std::uint32_t onlyHand = 1, nothing = 2, everything = 3, mixed = 4;
+constexpr std::uint32_t onlyHand = 1, nothing = 2, everything = 3, mixed = 4, tiny = 5;
 
 using Layers = std::vector<ClipLayer>;
 
@@ -37,7 +37,7 @@ class ClipsSample : public ::testing::Test {
     clips[addWave].baseClip = reach;
     clips[addWave].baseTime = 0.5;
     rig_->masks = {Floats(arm::nodeCount, 0), Floats(arm::nodeCount, 0), Floats(arm::nodeCount, 1),
-                   Floats(arm::nodeCount, 0.25f)};
+                   Floats(arm::nodeCount, 0.25f), Floats(arm::nodeCount, 0x0.ffp-60f)};
     rig_->masks[onlyHand - 1][arm::hand] = 1;
     rig_->masks[mixed - 1][arm::hand] = 0.75f;
     rig_->pack();
@@ -87,7 +87,7 @@ TEST_F(ClipsSample, RefusesLayers) {
   };
   refuse({.clip = 5});
   refuse({.clip = 0xffffffffu});
-  refuse({.mask = 5});
+  refuse({.mask = 6});
   refuse({.mask = 0xffffffffu});
   for (const double time : {infinity, -infinity, double{notANumber}}) refuse({.time = time});
   for (const float weight : {notANumber, static_cast<float>(infinity), -1e-3f, 65520.0f, 1e30f})
@@ -141,6 +141,8 @@ TEST_F(ClipsSample, WithoutWeightAllRests) {
   expectSame({}, {{.clip = wave, .time = 0.3, .mask = nothing}});
   expectSame({}, {{.clip = addReach, .time = 0.3, .weight = 0}});
   expectSame({}, {{.clip = addReach, .time = 0.3, .mask = nothing}});
+  expectSame({}, {{.clip = wave, .time = 0.3, .weight = 60'000, .mask = tiny}});
+  rig().check(Layers{{.clip = wave, .time = 0.3, .weight = 60'000, .mask = tiny}});
   rig().check(Layers{});
 }
 

@@ -366,5 +366,30 @@ TEST(RigBytes, ADamagedWordIsFoundOrHarmless) {
   EXPECT_GT(accepted, 1000u);
 }
 
+/// With drivers at its end that drive nothing: chains of one node, which is the same for all.
+std::vector<std::uint32_t> withIdleChains(const PackedRig& rig, std::uint32_t count) {
+  std::vector<std::uint32_t> words = wordsOf(rig);
+  const auto node = static_cast<std::uint32_t>(words.size());
+  words.resize(words.size() + abi::RIG_NODE_WORDS);
+  words[node + 1] = node;  // its joints: none
+  const RigHeader header = RigBlob(rig).header;
+  const auto drivers = static_cast<std::uint32_t>(words.size());
+  for (std::uint32_t i = 0; i < header.driverCount * abi::RIG_DRIVER_WORDS; ++i)
+    words.push_back(words[header.drivers + i]);
+  for (std::uint32_t i = 0; i < count; ++i) words.insert(words.end(), {abi::RIG_CHAIN, node, 1, 0});
+  words[offsetof(RigHeader, drivers) / 4] = drivers;
+  words[offsetof(RigHeader, driverCount) / 4] = header.driverCount + count;
+  words[offsetof(RigHeader, wordCount) / 4] = static_cast<std::uint32_t>(words.size());
+  words[offsetof(RigHeader, checksum) / 4] = checksumOfBlob(words);
+  return words;
+}
+
+// What a rig costs is bounded by its bytes.
+TEST(RigBytes, ManyDriversCannotShareTheirData) {
+  const PackedRig rig = allDrivers().pack();
+  EXPECT_TRUE(read(withIdleChains(rig, 1)).ok());
+  EXPECT_FALSE(read(withIdleChains(rig, 1000)).ok());
+}
+
 }  // namespace
 }  // namespace dermis::test

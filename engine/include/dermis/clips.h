@@ -118,8 +118,8 @@ struct PackClipsOptions {
   /// reaches. If empty, a joint reaches as far as its farthest child, or if it has none as far as
   /// its parent is.
   std::span<const JointBounds* const> meshes = {};
-  /// Masks, at most 31: a factor from 0 to 1 for each node of the skeleton. Layers name them by
-  /// their number in this list, from 1 on.
+  /// Masks, at most 31: a factor from 0 to 1 for each node of the skeleton. One below 2^-60 counts
+  /// as 0. Layers name them by their number in this list, from 1 on.
   std::span<const std::span<const float>> masks = {};
   /// How far a morph weight may be from that of the clips. 0: 1/1000.
   double maxWeightError = 0;

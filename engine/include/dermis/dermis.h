@@ -1077,7 +1077,7 @@ typedef struct dermis_clips_source {
   const dermis_node* nodes;
   const dermis_skin* skins;
   const dermis_clip_view* clips;
-  const float* masks;  // for each mask a factor from 0 to 1 for each node
+  const float* masks;  // for each mask a factor from 0 to 1 for each node; 0 below 2^-60
   // How far anything that a joint moves may be from where the clips have it; 0: 1/10,000 of the
   // extent of the skeleton.
   double max_error;

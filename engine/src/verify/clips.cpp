@@ -306,7 +306,8 @@ struct Layer {
   const float* mask = nullptr;
 
   double factor(std::uint32_t node) const {
-    return mask != nullptr ? weight * double{mask[node]} : weight;
+    if (mask == nullptr) return weight;
+    return mask[node] < 0x1p-60f ? 0 : weight * double{mask[node]};  // `PackClipsOptions::masks`
   }
 };
 

@@ -1,6 +1,7 @@
 // What a bank is asked, and whether stored bytes are one.
 #include "clips/bank.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -22,16 +23,17 @@ class BankCheck {
  public:
   explicit BankCheck(std::span<const std::uint32_t> words) : bank_(words), total_(words.size()) {}
 
-  Result<void> run() const {
+  Result<void> run() {
     const BankHeader& header = bank_.header;
     const std::uint64_t nodes = header.nodeCount;
     if (!isSection(header.nodes, nodes * sizeof(BankNode) / 4) ||
         !isSection(header.skins, header.skinCount * std::uint64_t{sizeof(BankSkin) / 4}) ||
         !isSection(header.clips, header.clipCount * std::uint64_t{sizeof(BankClip) / 4}) ||
-        !areFinite(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
+        !areFactors(header.masks, header.maskCount * nodes) || header.skinCount == 0 ||
         !isSection(header.morphed, header.morphedCount * std::uint64_t{sizeof(BankMorphed) / 4}) ||
         (header.motion != 0 && !isMotion(header.motion)) || header.clipCount > maxClips ||
-        header.maskCount > maxMasks || header.nodes % 4 != 0 || header.clips % 4 != 0)
+        header.maskCount > maxMasks || header.nodes % 4 != 0 || header.clips % 4 != 0 ||
+        header.groupCount > total_)
       return damagedBank("its header does not fit its sections");
     for (std::size_t i = 0; i < nodes; ++i) {
       if (!isNode(i)) return damagedBank("node " + std::to_string(i) + " is not valid");
@@ -51,25 +53,38 @@ class BankCheck {
   }
 
  private:
-  bool isSection(std::uint64_t offset, std::uint64_t count) const {
-    return offset >= sizeof(BankHeader) / 4 && offset <= total_ && count <= total_ - offset;
+  /// Sections do not overlap, so that small banks are small: what all take is at most all words.
+  bool isSection(std::uint64_t offset, std::uint64_t count) {
+    if (offset < sizeof(BankHeader) / 4 || offset > total_ || count > total_ - offset) return false;
+    taken_ += count;
+    return taken_ <= total_;
   }
-  bool areFinite(std::uint64_t offset, std::uint64_t count) const {
+  bool allAre(bool (*good)(float), std::uint64_t offset, std::uint64_t count) {
     if (!isSection(offset, count)) return false;
     for (std::uint64_t i = offset; i < offset + count; ++i) {
-      if (!std::isfinite(bank_.number(static_cast<std::size_t>(i)))) return false;
+      if (!good(bank_.number(static_cast<std::size_t>(i)))) return false;
     }
     return true;
   }
+  bool areFinite(std::uint64_t offset, std::uint64_t count) {
+    return allAre([](float number) { return std::isfinite(number); }, offset, count);
+  }
+  bool areFactors(std::uint64_t offset, std::uint64_t count) {
+    return allAre([](float factor) { return factor >= 0 && factor <= 1; }, offset, count);
+  }
 
-  bool isNode(std::size_t index) const {
+  bool isNode(std::size_t index) {
     const BankNode node = bank_.node(index);
-    const std::size_t record = bank_.header.nodes + index * sizeof(BankNode) / 4;
-    return (node.parent == noNode || node.parent < index) && areFinite(record + 3, 13) &&
+    const auto isFinite = [](float number) { return std::isfinite(number); };
+    return (node.parent == noNode || node.parent < index) &&
+           std::ranges::all_of(node.translation, isFinite) &&
+           std::ranges::all_of(node.rotation, isFinite) &&
+           std::ranges::all_of(node.scale, isFinite) &&
+           isFinite(node.translationError + node.rotationError + node.scaleError) &&
            (node.fixed == 0 || (node.fixed % 4 == 0 && areFinite(node.fixed, 12)));
   }
 
-  bool isSkin(const BankSkin& skin) const {
+  bool isSkin(const BankSkin& skin) {
     if (skin.jointCount == 0 || skin.jointCount > maxPoseJoints || skin.matrices % 4 != 0 ||
         !isSection(skin.nodes, skin.jointCount) ||
         !areFinite(skin.matrices, std::uint64_t{12} * skin.jointCount))
@@ -81,20 +96,21 @@ class BankCheck {
     return true;
   }
 
-  bool isMorphed(const BankMorphed& node) const {
+  bool isMorphed(const BankMorphed& node) {
     const std::uint64_t groups = node.groupCount();
     return groups > 0 && groups + node.firstGroup <= bank_.header.groupCount &&
-           areFinite(node.rest, 3 * groups) && areFinite(node.masks, bank_.header.maskCount) &&
+           areFinite(node.rest, 3 * groups) && areFactors(node.masks, bank_.header.maskCount) &&
            std::isfinite(node.error);
   }
 
-  bool isMotion(std::uint32_t offset) const {
-    if (!areFinite(std::uint64_t{offset} + 1, 3)) return false;
+  bool isMotion(std::uint32_t offset) {
+    if (!isSection(offset, sizeof(BankMotion) / 4)) return false;
     const auto motion = bank_.at<BankMotion>(offset);
-    return motion.upAxis < 3 && motion.length > 0;
+    return motion.upAxis < 3 && motion.length > 0 && std::isfinite(motion.length) &&
+           std::isfinite(motion.translationError + motion.rotationError);
   }
 
-  bool isClass(const BankClass& keys) const {
+  bool isClass(const BankClass& keys) {
     const KeyFormat format = KeyFormat::of(keys.format);
     const std::uint64_t columns = keys.columnCount, intervals = std::uint64_t{keys.keyCount} - 1;
     return keys.format < 8 && format.size < 3 && keys.level < 32 && keys.keyCount >= 2 &&
@@ -105,7 +121,7 @@ class BankCheck {
            (keys.jumps == 0 || isSection(keys.jumps, intervals * ((columns + 3) / 4)));
   }
 
-  bool isTrack(const BankClip& clip, std::uint32_t word, bool isRotation) const {
+  bool isTrack(const BankClip& clip, std::uint32_t word, bool isRotation) {
     switch (static_cast<TrackKind>(word >> 30)) {
       case TrackKind::rest:
         return word == 0;
@@ -122,7 +138,7 @@ class BankCheck {
     return false;
   }
 
-  bool isClip(const BankClip& clip) const {
+  bool isClip(const BankClip& clip) {
     const std::uint64_t ofNodes = std::uint64_t{3} * bank_.header.nodeCount;
     const std::uint64_t tracks = bank_.trackCount();
     if (!std::isfinite(clip.duration) || clip.duration < 0 || !std::isfinite(clip.rate) ||
@@ -142,6 +158,7 @@ class BankCheck {
 
   ClipBank bank_;
   std::uint64_t total_;
+  std::uint64_t taken_ = sizeof(BankHeader) / 4;
 };
 
 }  // namespace

@@ -18,6 +18,7 @@ namespace dermis {
 inline constexpr std::uint32_t clipsMagic = 0x504c4344u;  // "DCLP"
 inline constexpr std::uint32_t clipsVersion = 2;
 inline constexpr std::uint32_t noNode = 0xffffffffu;
+inline constexpr float leastMaskFactor = 0x1p-60f;  ///< smaller ones are stored as 0
 
 /// The first four words are those of a packed mesh header, so that the checksum is computed in the
 /// same way.

@@ -37,7 +37,7 @@ class BankWriter {
     for (std::size_t mask = 0; mask < parts_.masks.size(); ++mask) {
       for (std::size_t i = 0; i < parts_.moved.size(); ++i) {
         words_[header.masks + mask * parts_.moved.size() + i] =
-            std::bit_cast<std::uint32_t>(parts_.masks[mask][parts_.moved[i].source]);
+            factorWord(parts_.masks[mask][parts_.moved[i].source]);
       }
     }
     for (std::size_t i = 0; i < parts_.moved.size(); ++i)
@@ -88,6 +88,11 @@ class BankWriter {
     return offset;
   }
 
+  /// Times any weight it is a normal number, or 0.
+  static std::uint32_t factorWord(float factor) {
+    return std::bit_cast<std::uint32_t>(factor < leastMaskFactor ? 0.0f : factor);
+  }
+
   void writeNode(std::size_t offset, const MovedNode& node) {
     BankNode record{};
     record.parent = node.parent;
@@ -115,7 +120,7 @@ class BankWriter {
           std::bit_cast<std::uint32_t>(static_cast<float>(node.rest[i / 3][i % 3]));
     record.masks = reserve(parts_.masks.size());
     for (std::size_t mask = 0; mask < parts_.masks.size(); ++mask)
-      words_[record.masks + mask] = std::bit_cast<std::uint32_t>(parts_.masks[mask][node.source]);
+      words_[record.masks + mask] = factorWord(parts_.masks[mask][node.source]);
     record.error = node.error;
     put(offset, record);
   }

@@ -52,10 +52,14 @@ class RigCheck {
   std::size_t weights() const {
     return std::size_t{rig_.header.givenWeights} + rig_.header.drivenWeights;
   }
-  bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t wordsEach) const {
+  /// Sections do not overlap, so that small rigs are small: what all take is at most all words.
+  bool isSection(std::uint64_t offset, std::uint64_t count, std::uint64_t wordsEach) {
     const std::uint64_t total = rig_.words.size();
-    return offset % 4 == 0 && offset >= sizeof(RigHeader) / 4 && offset <= total &&
-           count <= (total - offset) / wordsEach;
+    if (offset % 4 != 0 || offset < sizeof(RigHeader) / 4 || offset > total ||
+        count > (total - offset) / wordsEach)
+      return false;
+    taken_ += count * wordsEach;
+    return taken_ <= total;
   }
   template <std::size_t size>
   static bool areFinite(const float (&numbers)[size]) {
@@ -180,6 +184,7 @@ class RigCheck {
   }
 
   RigBlob rig_;
+  std::uint64_t taken_ = sizeof(RigHeader) / 4;
   std::vector<bool> isDriven_, isWeighed_;  ///< so far
 };
 
