@@ -190,6 +190,42 @@ TEST_P(RigBounds, HoldForEvaluateRigAndForInexactArithmetic) {
   EXPECT_LT(exact.shareUnbounded(), 0.3);  // drivers that read drivers that read drivers
 }
 
+/// Any numbers as a pose: many are 0, and some are larger or smaller by such a factor.
+std::vector<JointMatrix> arbitraryPose(std::mt19937& random, std::uint32_t joints, double factor) {
+  std::vector<JointMatrix> pose(joints);
+  for (JointMatrix& joint : pose) {
+    for (auto& row : joint.m) {
+      for (float& entry : row) {
+        const std::uint32_t kind = below(random, 12);
+        const double size = kind == 0 ? factor : kind == 1 ? 1 / factor : 1;
+        entry = kind < 5 && kind > 1 ? 0 : static_cast<float>(between(random, -2, 2) * size);
+      }
+    }
+  }
+  return pose;
+}
+
+// Singular matrices among them, whose bounds must be infinite.
+TEST(RigBounds, HoldForAnyMatrices) {
+  std::mt19937 random(11);
+  for (const double factor : {1.0, 1e2, 1e4, 1e8, 1e12}) {
+    Shares shares;
+    for (int round = 0; round < 300; ++round) {
+      const MadeRig rig = randomRig(random, kinds[round % 4]);
+      const PackedRig packed = rig.pack();
+      const std::vector<float> weights(rig.givenWeights, 0.5f);
+      for (int i = 0; i < 4; ++i) {
+        const std::vector<JointMatrix> pose = arbitraryPose(random, rig.writtenJoints, factor);
+        const auto expected = reference::evaluateRig(rig.view(), pose, weights);
+        ASSERT_TRUE(expected.ok()) << expected.error().message;
+        shares.add(evaluated(packed, pose, weights), *expected);
+        ASSERT_LE(shares.worst, 1) << "factor " << factor << ", round " << round;
+      }
+    }
+    EXPECT_LT(shares.shareUnbounded(), 0.7) << factor;
+  }
+}
+
 /// The largest bound of a joint that takes half of the twist about x of joint 1, which is below 0.
 double boundOfTwist(const glm::dmat4& turn, const glm::dmat4& above = glm::dmat4(1)) {
   MadeRig rig;

@@ -175,13 +175,12 @@ std::array<double, 3> orthonormalErrors(const Matrix& m) {
   const dvec3 first = columnOf(m, 0), second = columnOf(m, 1);
   const double x = unitError(glm::length(first), errorOf(0));
   // The second column minus its part along x.
-  const double along = std::abs(glm::dot(glm::normalize(first), second));
+  const dvec3 unit = glm::normalize(first);
+  const double along = std::abs(glm::dot(unit, second));
   const double size = glm::length(second) + errorOf(1);
   const double rest = errorOf(1) + x * (along + size + errorOf(1) + x * size) + 5 * rounded * size +
                       8 * leastNormal * (1 + size);
-  const double y = unitError(
-      glm::length(orthonormal(linearOf(m))[1] * glm::dot(orthonormal(linearOf(m))[1], second)),
-      rest);
+  const double y = unitError(glm::length(second - glm::dot(unit, second) * unit), rest);
   return {x, y, x + y + x * y + 3 * rounded};
 }
 
@@ -377,11 +376,11 @@ Sensed RigReference::rotationAt(std::uint32_t joint) const {
     for (std::size_t column = 0; column < 3; ++column)
       relative[row][column] = joints_[joint][row][column];
   Sensed sensed;
-  dmat3 aboveBind(1.0), above(1.0);
+  dmat3 aboveBind(1.0);
   bool isSignKnown = true;
+  double sign = 1;
   if (parent != noParent) {
     aboveBind = linearOf(numbersOf(rig_.joints[parent].bind));
-    above = linearOf(joints_[parent]);
     const Numbers3x4& m = joints_[parent];
     Numbers3x3 adjugate;
     for (std::size_t row = 0; row < 3; ++row) {
@@ -394,14 +393,12 @@ Sensed RigReference::rotationAt(std::uint32_t joint) const {
     const Number determinant =
         sumOf({{m[0][0], adjugate[0][0]}, {m[0][1], adjugate[1][0]}, {m[0][2], adjugate[2][0]}});
     isSignKnown = std::abs(determinant.value) > determinant.error;
+    sign = determinant.value < 0 ? -1 : 1;
     relative = linearProduct(adjugate, relative);
   }
   const dmat3 bindLinear = linearOf(bind);
   sensed.localBind = glm::inverse(aboveBind) * bindLinear;
   sensed.axes = orthonormal(sensed.localBind);
-  sensed.rotation =
-      glm::transpose(sensed.axes) *
-      orthonormal(glm::inverse(above * aboveBind) * linearOf(joints_[joint]) * bindLinear);
   sensed.isMirrored = glm::determinant(aboveBind) < 0;
   sensed.condition = conditionOf(aboveBind) * conditionOf(sensed.localBind);
 
@@ -412,6 +409,8 @@ Sensed RigReference::rotationAt(std::uint32_t joint) const {
       storedLeft[row][column] =
           stored(entryOf(left, row, column), sensed.condition * sizeOf(inverse));
   relative = linearProduct(linearProduct(storedLeft, relative), bind);
+  // By the adjugate, since an inverse loses all digits where entries differ much in size.
+  sensed.rotation = orthonormal(sign * linearOf(relative));
   sensed.error =
       isSignKnown ? quaternionError(sensed.rotation, orthonormalErrors(relative)) : unbounded;
   return sensed;
