@@ -4,6 +4,7 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <unordered_map>
 #include <utility>
 
 #include "core/attribute.h"
@@ -19,6 +20,7 @@ struct Influence {
   float weight;
 };
 using VertexInfluences = std::vector<std::vector<Influence>>;
+using VerticesByJoint = std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>;
 
 template <typename T>
 SharedArray<std::byte> bytesOf(const std::vector<T>& values) {
@@ -194,13 +196,20 @@ class RigApplier {
   std::vector<Influences> boundInfluences(const Primitive& primitive) {
     const std::uint32_t count = primitive.vertexCount;
     const std::uint32_t slots = primitive.influencesPerVertex();
-    spend(budget_, count, 64 + 16 * std::uint64_t{slots}, "the vertices of a chain");
+    spend(budget_, count, 64 + 32 * std::uint64_t{slots}, "the vertices of a chain");
     VertexInfluences vertices(count);
     const PrimitiveView view(primitive);
     for (const InfluenceSet& set : view.mesh().influenceSets) appendTo(vertices, set, count);
+    VerticesByJoint ofJoints;
+    for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
+      for (const Influence& influence : vertices[vertex]) {
+        std::vector<std::uint32_t>& list = ofJoints[influence.joint];
+        if (list.empty() || list.back() != vertex) list.push_back(vertex);
+      }
+    }
     bool isBound = false;
     for (const ChainDriver& chain : rig_.chains)
-      isBound = bindTo(chain, primitive, vertices) || isBound;
+      isBound = bindTo(chain, primitive, vertices, ofJoints) || isBound;
     if (!isBound) return primitive.influences;
 
     std::size_t most = 1;
@@ -226,22 +235,35 @@ class RigApplier {
   }
 
   /// Binds the vertices that joints of the chain move. Returns whether there are any.
-  bool bindTo(const ChainDriver& chain, const Primitive& primitive, VertexInfluences& vertices) {
-    const std::set<std::uint32_t> joints(chain.joints.begin(), chain.joints.end());
+  bool bindTo(const ChainDriver& chain, const Primitive& primitive, VertexInfluences& vertices,
+              VerticesByJoint& ofJoints) {
+    // Looking joints up takes more time than memory.
+    spend(budget_, chain.joints.size(), 16, "the vertices of a chain");
     std::vector<std::uint32_t> moved;
-    std::uint32_t slots = 0;
-    for (std::uint32_t vertex = 0; vertex < vertices.size(); ++vertex) {
-      const std::vector<Influence>& from = vertices[vertex];
-      const bool isMoved = std::ranges::any_of(
-          from, [&](const Influence& influence) { return joints.contains(influence.joint); });
-      if (!isMoved) continue;
-      moved.push_back(vertex);
-      slots = std::max(slots, static_cast<std::uint32_t>(from.size()));
+    std::size_t most = 0;
+    for (const std::uint32_t joint : chain.joints) {
+      const auto found = ofJoints.find(joint);
+      if (found == ofJoints.end()) continue;
+      for (const std::uint32_t vertex : found->second) {
+        // Binding to another chain may have removed a bad influence.
+        const std::vector<Influence>& from = vertices[vertex];
+        if (std::ranges::find(from, joint, &Influence::joint) == from.end()) continue;
+        moved.push_back(vertex);
+        most = std::max(most, from.size());
+      }
+      ofJoints.erase(found);
     }
+    std::ranges::sort(moved);
+    const auto repeated = std::ranges::unique(moved);
+    moved.erase(repeated.begin(), repeated.end());
     if (moved.empty()) return false;
     const auto count = static_cast<std::uint32_t>(moved.size());
-    // Each vertex is compared with places on all pieces of the curve, which takes time.
-    spend(budget_, count, 48 + 24 * std::uint64_t{slots + 2} + 8 * chain.joints.size(),
+    const auto slots = static_cast<std::uint32_t>(most);
+    // Each vertex is compared with places on all pieces of the curve, and each of its influences
+    // with all joints, which takes time.
+    const std::uint64_t comparisons = chain.joints.size() * std::uint64_t{slots};
+    spend(budget_, count,
+          48 + 24 * std::uint64_t{slots + 2} + 8 * chain.joints.size() + comparisons / 4,
           "the vertices of a chain");
     std::vector<float> positions, weights;
     std::vector<std::uint32_t> ofSlots;
