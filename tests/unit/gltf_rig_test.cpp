@@ -1,6 +1,9 @@
 // Rigs as JSON: what they do to a model, and the sentence about each mistake.
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -330,6 +333,114 @@ TEST(GltfRig, NotesJointsBelowADrivenOne) {
       model.notes.back(),
       "the rig of skin 0: 'twist' and 1 other joint below the driven joint 'lower' follow the "
       "node, not the driver");
+}
+
+/// Text with many elements.
+template <typename Element>
+std::string listOf(int count, Element element) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += std::string(i == 0 ? "" : ",") + element(i);
+  return text;
+}
+
+/// More meshes of the skin, equal to the first one.
+void addMeshes(gltf::Model& model, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    gltf::Node node = model.nodes[0];
+    node.mesh = static_cast<std::uint32_t>(model.meshes.size());
+    model.nodeOrder.push_back(static_cast<std::uint32_t>(model.nodes.size()));
+    model.nodes.push_back(node);
+    model.meshes.push_back(model.meshes[0]);
+  }
+}
+
+/// Each mesh is searched for each driven weight. That takes time, which the budget limits.
+TEST(GltfRig, CountsMeshesTimesWeights) {
+  constexpr int weights = 600;
+  const std::string text =
+      R"({"drivers": [{"corrective": ["lower"], "examples": [{"rotations": [[0, 0, 0, 1]],
+          "weights": {)" +
+      listOf(weights, [](int i) { return "\"" + std::to_string(i + 2) + "\": 1"; }) + "}}]}]}";
+  gltf::Model model = loaded(arm());
+  addMeshes(model, 500);
+  model.meshes.back().morphTargetCount = weights + 2;
+  model.meshes.back().morphWeights.resize(weights + 2);
+  model.memoryLeft = std::uint64_t{8} << 20;
+  gltf::Model without = model;
+  const Rig refused = gltf::applyRig(model, 0, text);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::limitExceeded);
+  EXPECT_NE(refused.error().message.find("the morph targets of a rig"), std::string::npos)
+      << refused.error().message;
+
+  // Those without targets are not searched.
+  for (std::size_t mesh = 0; mesh + 1 < without.meshes.size(); ++mesh)
+    without.meshes[mesh].morphTargetCount = 0;
+  const Rig rig = gltf::applyRig(without, 0, text);
+  EXPECT_TRUE(rig.ok()) << rig.error().message;
+}
+
+/// Takes half a minute if each chain looks at each vertex.
+TEST(GltfRig, ManyChainsThatMoveNoVertexTakeNoTime) {
+  constexpr std::uint32_t count = 40'000;
+  gltf::Model model = loaded(arm());
+  gltf::Primitive& primitive = model.meshes[0].primitives[0];
+  primitive.morphTargets.clear();
+  primitive.vertexCount = count;
+  primitive.positions = std::vector<float>(count * 3);
+  gltf::Influences& set = primitive.influences[0];
+  set.joints = std::vector<std::byte>(count * 4);
+  ASSERT_EQ(set.weightType, ComponentType::float32);
+  std::vector<float> weights(count * 4);
+  for (std::size_t i = 0; i < count; ++i) weights[i * 4] = 1;
+  const auto bytes = std::as_bytes(std::span(weights));
+  set.weights = std::vector<std::byte>(bytes.begin(), bytes.end());
+  const Rig rig = gltf::applyRig(model, 0, "{\"drivers\": [" + listOf(5000, [](int) {
+                                             return R"({"chain": [2, 3], "segments": 2})";
+                                           }) + "]}");
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  EXPECT_TRUE(componentsOf<std::uint16_t>(onlySet(firstPrimitive(model)).joints) ==
+              std::vector<std::uint16_t>(std::size_t{count} * 4));
+}
+
+/// A vertex that one chain moves to its end may be on the next one.
+TEST(GltfRig, ChainsBindOneAfterTheOther) {
+  gltf::Model model = loaded(arm());
+  const Rig rig = gltf::applyRig(model, 0, R"({"drivers": [
+    {"chain": ["upper", "lower"], "segments": 2}, {"chain": ["lower", "hand"], "segments": 2}]})");
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  const gltf::Influences set = onlySet(firstPrimitive(model));
+  const auto joints = componentsOf<std::uint16_t>(set.joints);
+  const auto weights = componentsOf<float>(set.weights);
+  const auto only = [&](std::size_t vertex, std::uint16_t joint) {
+    float sum = 0;
+    for (std::size_t i = vertex * 4; i < vertex * 4 + 4; ++i)
+      if (joints[i] == joint) sum += weights[i];
+    EXPECT_FLOAT_EQ(sum, 1) << "vertex " << vertex << ", joint " << joint;
+  };
+  only(0, 0);
+  only(1, 1);
+  only(2, 2);
+  only(3, 3);
+  only(4, 4);
+  only(5, 5);  // in the middle of the first
+}
+
+TEST(GltfRig, CountsPrimitivesTimesChains) {
+  gltf::Model model = loaded(arm());
+  gltf::Mesh& mesh = model.meshes[0];
+  mesh.primitives[0].morphTargets.clear();
+  mesh.primitives[0].influences[0].joints = std::vector<std::byte>(6 * 4);
+  for (int i = 0; i < 300; ++i) {
+    mesh.primitives.push_back(mesh.primitives[0]);
+    mesh.primitives.back().positions = std::vector<float>(mesh.primitives[0].positions.values());
+  }
+  model.memoryLeft = std::uint64_t{4} << 20;
+  const Rig rig = gltf::applyRig(model, 0, "{\"drivers\": [" + listOf(1000, [](int) {
+                                             return R"({"chain": [1, 3], "segments": 2})";
+                                           }) + "]}");
+  ASSERT_FALSE(rig.ok());
+  EXPECT_EQ(rig.error().code, ErrorCode::limitExceeded);
 }
 
 TEST(GltfRig, ASingularBindMatrixIsAMistakeOnlyIfADriverReadsIt) {

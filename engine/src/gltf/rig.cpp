@@ -79,6 +79,48 @@ std::uint32_t numberFrom(const std::string& name) {
   return error == std::errc() && stop == end ? number : none;
 }
 
+/// How the text names a morph target.
+struct TargetName {
+  std::string name;
+  std::uint32_t number = none;  ///< the name as a number
+};
+
+/// "mesh 'arm'"; without a name "mesh 2".
+std::string titleOf(const Model& model, std::uint32_t mesh) {
+  const std::string& name = model.meshes[mesh].name;
+  return "mesh " + (name.empty() ? textOf(mesh) : inQuotes(name));
+}
+
+/// The morph targets of a mesh.
+class TargetFinder {
+ public:
+  TargetFinder(const Model& model, std::uint32_t index, MemoryBudget& budget)
+      : model_(model), index_(index), count_(model.meshes[index].morphTargetCount) {
+    spend(budget, count_, 96, "the morph targets of a rig");
+    const std::vector<std::string>& names = model.meshes[index].morphTargetNames;
+    for (std::uint32_t i = 0; i < std::min<std::size_t>(names.size(), count_); ++i) {
+      const auto [known, isNew] = byName_.emplace(names[i], i);
+      if (!isNew) known->second = none;
+    }
+  }
+
+  /// The target that has this name; if there is none, with this number. Otherwise `none`. Fails if
+  /// several have the name.
+  std::uint32_t find(const TargetName& target) const {
+    const auto found = target.name.empty() ? byName_.end() : byName_.find(target.name);
+    if (found == byName_.end()) return target.number < count_ ? target.number : none;
+    if (found->second == none)
+      failInvalid("several morph targets of ", titleOf(model_, index_), " are called ",
+                  inQuotes(target.name), "; write the number of one");
+    return found->second;
+  }
+
+ private:
+  const Model& model_;
+  std::uint32_t index_, count_;
+  std::map<std::string_view, std::uint32_t> byName_;  ///< `none`: several
+};
+
 /// The inverse, or zeros if there is none; `packRig` refuses a driver that reads that.
 JointMatrix inverseOrZero(const JointMatrix& matrix) {
   Affine<double> numbers;
@@ -257,18 +299,18 @@ class RigReader {
             readOffset(joint.value(), join(where, ": joint ", inQuotes(joint.key())));
       }
     }
-    corrective.firstWeight = static_cast<std::uint32_t>(rig_.driven.size());
+    corrective.firstWeight = static_cast<std::uint32_t>(driven_.size());
     corrective.weightCount = static_cast<std::uint32_t>(weights.size());
     corrective.weights = values;
     corrective.offsets = offsets;
-    rig_.driven.resize(rig_.driven.size() + weights.size());
+    driven_.resize(driven_.size() + weights.size());
     for (const auto& [name, place] : weights) {
       const std::uint32_t number = corrective.firstWeight + static_cast<std::uint32_t>(place);
       const auto [other, isNew] = drivenWeights_.emplace(name, std::pair(number, driver_));
       if (!isNew)
         failInvalid(where_, ": driver ", other->second.second, " drives the weight ",
                     inQuotes(name), ", too");
-      rig_.driven[number] = name;
+      driven_[number] = {name, numberFrom(name)};
     }
     std::vector<std::uint32_t>& driven = rig_.jointLists.emplace_back(joints.size());
     for (const auto& [joint, place] : joints) driven[place] = drive(joint);
@@ -391,10 +433,18 @@ class RigReader {
     }
   }
 
-  /// Whether a mesh has all these morph targets.
-  static bool hasAll(const Mesh& mesh, const std::set<std::string>& names) {
-    return std::ranges::all_of(
-        names, [&](const std::string& name) { return findTarget(mesh, name) != none; });
+  /// Fails if two driven weights are one target of the mesh: both would displace it. `targets`: by
+  /// driven weight.
+  void checkDriven(std::uint32_t mesh, const std::vector<std::uint32_t>& targets) const {
+    std::map<std::uint32_t, std::size_t> known;
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      if (targets[i] == none) continue;
+      const auto [other, isNew] = known.emplace(targets[i], i);
+      if (!isNew)
+        failInvalid("driver ", drivenWeights_.at(driven_[i].name).second, ": the weights ",
+                    inQuotes(driven_[other->second].name), " and ", inQuotes(driven_[i].name),
+                    " are the same morph target of ", titleOf(model_, mesh), "; write one of them");
+    }
   }
 
   void findWeights() {
@@ -403,42 +453,62 @@ class RigReader {
       for (const std::string& name : names)
         (drivenWeights_.contains(name) ? read : given).insert(name);
     }
+    std::vector<TargetName> givenNames;
+    for (const std::string& name : given) givenNames.push_back({name, numberFrom(name)});
+    std::vector<std::uint32_t> givenTargets;  // of the mesh that has them all
+    std::vector<bool> isTarget(driven_.size());
     std::set<std::uint32_t> meshes;
     for (std::uint32_t i = 0; i < model_.nodes.size(); ++i) {
       const Node& node = model_.nodes[i];
-      if (node.skin != number_) continue;
-      const Mesh& mesh = model_.meshes[node.mesh];
-      if (!meshes.insert(node.mesh).second) continue;
-      spend(budget_, mesh.morphTargetNames.size(), given.size() + drivenWeights_.size(),
-            "the morph targets of a rig");
-      if (rig_.view.weightsOf == none && !given.empty() && hasAll(mesh, given))
-        rig_.view.weightsOf = i;
+      if (node.skin != number_ || !meshes.insert(node.mesh).second) continue;
+      if (model_.meshes[node.mesh].morphTargetCount == 0) continue;
+      // Looking names up takes more time than memory.
+      spend(budget_, given.size() + driven_.size(), 32, "the morph targets of a rig");
+      const TargetFinder known(model_, node.mesh, budget_);
+      std::vector<std::uint32_t> targets;
+      for (const TargetName& name : driven_) targets.push_back(known.find(name));
+      checkDriven(node.mesh, targets);
+      bool hasSome = false;
+      for (std::size_t weight = 0; weight < targets.size(); ++weight) {
+        if (targets[weight] == none) continue;
+        isTarget[weight] = true;
+        hasSome = true;
+      }
+      if (hasSome) rig_.targets.emplace(node.mesh, std::move(targets));
+      if (rig_.view.weightsOf != none || given.empty()) continue;
+      givenTargets.clear();
+      const bool hasAll = std::ranges::all_of(givenNames, [&](const TargetName& name) {
+        return givenTargets.emplace_back(known.find(name)) != none;
+      });
+      if (hasAll) rig_.view.weightsOf = i;
     }
     if (!given.empty() && rig_.view.weightsOf == none)
       failInvalid("the rig: no mesh of the skin has the morph target ", inQuotes(*given.begin()),
                   given.size() == 1 ? "" : " and the others that linear drivers read");
     for (const auto& [name, driven] : drivenWeights_) {
-      const bool isTarget = std::ranges::any_of(meshes, [&, &target = name](std::uint32_t mesh) {
-        return findTarget(model_.meshes[mesh], target) != none;
-      });
-      if (!isTarget && !read.contains(name))
+      if (!isTarget[driven.first] && !read.contains(name))
         failInvalid("driver ", driven.second, ": no mesh of the skin has the morph target ",
                     inQuotes(name));
     }
     // Given ones are all targets of the mesh that no driver drives.
-    std::map<std::uint32_t, std::uint32_t> numbers;
+    std::map<std::string, std::uint32_t> givenNumbers;
     if (rig_.view.weightsOf != none) {
-      const Mesh& mesh = model_.meshes[model_.nodes[rig_.view.weightsOf].mesh];
+      const std::uint32_t index = model_.nodes[rig_.view.weightsOf].mesh;
       std::set<std::uint32_t> driven;
-      for (const std::string& name : rig_.driven) driven.insert(findTarget(mesh, name));
-      for (std::uint32_t target = 0; target < mesh.morphTargetCount; ++target)
+      if (const auto found = rig_.targets.find(index); found != rig_.targets.end())
+        driven.insert(found->second.begin(), found->second.end());
+      std::map<std::uint32_t, std::uint32_t> numbers;
+      for (std::uint32_t target = 0; target < model_.meshes[index].morphTargetCount; ++target)
         if (!driven.contains(target)) numbers.emplace(target, rig_.view.givenWeights++);
-      for (const std::string& name : given)
-        if (!numbers.contains(findTarget(mesh, name)))
-          failInvalid("the rig: the morph target ", inQuotes(name),
+      for (std::size_t i = 0; i < givenNames.size(); ++i) {
+        const auto number = numbers.find(givenTargets[i]);
+        if (number == numbers.end())
+          failInvalid("the rig: the morph target ", inQuotes(givenNames[i].name),
                       " is also driven, by its name or its number; write one of them");
+        givenNumbers.emplace(givenNames[i].name, number->second);
+      }
     }
-    rig_.view.drivenWeights = static_cast<std::uint32_t>(rig_.driven.size());
+    rig_.view.drivenWeights = static_cast<std::uint32_t>(driven_.size());
     for (CorrectiveDriver& corrective : rig_.correctives)
       corrective.firstWeight += rig_.view.givenWeights;
     for (std::size_t i = 0; i < termNames_.size(); ++i) {
@@ -447,8 +517,7 @@ class RigReader {
         const auto driven = drivenWeights_.find(name);
         list.push_back(driven != drivenWeights_.end()
                            ? rig_.view.givenWeights + driven->second.first
-                           : numbers.at(findTarget(
-                                 model_.meshes[model_.nodes[rig_.view.weightsOf].mesh], name)));
+                           : givenNumbers.at(name));
       }
       rig_.linears[i].weights = list;
     }
@@ -496,27 +565,13 @@ class RigReader {
   std::string where_;
   std::map<std::uint32_t, std::size_t> drivenJoints_;                           ///< and the driver
   std::map<std::string, std::pair<std::uint32_t, std::size_t>> drivenWeights_;  ///< and the driver
+  std::vector<TargetName> driven_;                                              ///< weights
   std::vector<std::vector<std::string>> termNames_;  ///< by linear driver
   std::array<std::vector<std::size_t>, 4> numbers_;  ///< by kind: numbers of drivers in the text
   std::uint64_t ofChains_ = 0;
 };
 
 }  // namespace
-
-std::uint32_t findTarget(const Mesh& mesh, const std::string& name) {
-  const std::vector<std::string>& names = mesh.morphTargetNames;
-  const auto end = names.begin() + static_cast<std::ptrdiff_t>(
-                                       std::min<std::size_t>(names.size(), mesh.morphTargetCount));
-  const auto found = std::find(names.begin(), end, name);
-  if (name.empty() || found == end) {
-    const std::uint32_t number = numberFrom(name);
-    return number < mesh.morphTargetCount ? number : none;
-  }
-  if (std::find(found + 1, end, name) != end)
-    failInvalid("several morph targets of mesh ", inQuotes(mesh.name), " are called ",
-                inQuotes(name), "; write the number of one");
-  return static_cast<std::uint32_t>(found - names.begin());
-}
 
 void readRig(const Model& model, std::uint32_t skin, std::string_view text, MemoryBudget& budget,
              OwnedRig& rig) {

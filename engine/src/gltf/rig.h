@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,16 +29,13 @@ struct OwnedRig {
   std::vector<std::vector<JointMatrix>> matrices;
 
   std::vector<std::uint32_t> places;  ///< by joint of the skin: the joint of the rig
-  std::vector<std::string> driven;    ///< names of driven weights
+  /// By mesh that has some: the target that each driven weight is, or `none`.
+  std::map<std::uint32_t, std::vector<std::uint32_t>> targets;
   std::vector<std::string> notes;
 };
 
 /// Reads the text for a skin of the model. Throws `Failure`.
 void readRig(const Model& model, std::uint32_t skin, std::string_view text, MemoryBudget& budget,
              OwnedRig& rig);
-
-/// The morph target of a mesh that has this name; if there is none, with this number. Otherwise
-/// `none`. Throws `Failure` if several have the name.
-std::uint32_t findTarget(const Mesh& mesh, const std::string& name);
 
 }  // namespace dermis::gltf

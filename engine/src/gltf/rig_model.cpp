@@ -55,7 +55,7 @@ class RigApplier {
     std::map<std::uint32_t, Targets> given;  // by mesh that has driven targets: the others
     for (const auto& [index, shared] : isShared) {
       Targets others;
-      meshes.push_back(newMesh(model_.meshes[index], others));
+      meshes.push_back(newMesh(index, others));
       if (meshes.back().morphTargetCount != model_.meshes[index].morphTargetCount)
         given.emplace(index, std::move(others));
     }
@@ -121,13 +121,13 @@ class RigApplier {
   }
 
   /// `given` become the targets that the rig does not drive, if it drives any.
-  Mesh newMesh(const Mesh& from, Targets& given) {
+  Mesh newMesh(std::uint32_t index, Targets& given) {
+    const Mesh& from = model_.meshes[index];
     for (const Primitive& primitive : from.primitives)
       spend(budget_, primitive.morphTargets.size() + 2, sizeof(Primitive), "the meshes of a rig");
     Mesh mesh = from;
-    Targets driven;
-    for (const std::string& name : rig_.driven) driven.push_back(findTarget(from, name));
-    if (std::ranges::any_of(driven, [](std::uint32_t target) { return target != none; })) {
+    if (const auto found = rig_.targets.find(index); found != rig_.targets.end()) {
+      const Targets& driven = found->second;
       spend(budget_, from.morphTargetCount + driven.size(), 96, "the morph targets of a rig");
       const std::set<std::uint32_t> known(driven.begin(), driven.end());
       for (std::uint32_t target = 0; target < from.morphTargetCount; ++target)
@@ -289,7 +289,12 @@ class RigApplier {
     if (!bent) throw Failure{bent.error()};
     VertexInfluences bound(count);
     appendTo(bound, bent->view().influenceSets.front(), count);
-    for (std::size_t i = 0; i < moved.size(); ++i) vertices[moved[i]] = std::move(bound[i]);
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      for (const Influence& influence : bound[i])
+        if (influence.joint == chain.joints.front() || influence.joint == chain.joints.back())
+          ofJoints[influence.joint].push_back(moved[i]);
+      vertices[moved[i]] = std::move(bound[i]);
+    }
     return true;
   }
 
