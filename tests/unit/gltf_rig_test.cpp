@@ -297,6 +297,19 @@ TEST(GltfRig, EachMistakeHasASentence) {
        "example 0: the weight 'bent' is not a number"},
       {R"({"corrective": ["lower"], "radius": -1, "examples": []})",
        "driver 0: radius is -1, which is negative"},
+      {R"({"corrective": ["lower"], "radius": 1e-50, "examples": []})",
+       "driver 0: radius is 1e-50, which is too small for float32"},
+      {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"bent": 1, "00": 1}}]})",
+       "driver 0: the weights '00' and 'bent' are the same morph target of mesh 0; write one of "
+       "them"},
+      {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"1": 1}}]}, )" + corrective +
+           R"([{"rotations": [[0, 0, 0, 1]], "weights": {"01": 1}}]})",
+       "driver 1: the weights '1' and '01' are the same morph target of mesh 0; write one of them"},
+      {corrective + R"([{"rotations": [[0, 0, 0, 1]], "weights": {"bent": 1}}]}, )" + corrective +
+           R"([{"rotations": [[0, 0, 0, 1]], "weights": {"bent": 1}}]})",
+       "driver 1: driver 0 drives the weight 'bent', too"},
+      {corrective + R"([{"rotations": [[0, 0, 0, 1]], "joints": {"muscle": {}, "4": {}}}]})",
+       "driver 0: example 0: joints: '4' and 'muscle' are the same joint; write one of them"},
       {corrective + R"([{"rotations": [[0, 0, 0, 1]], "joints": {"twist": {"turn": 1}}}]})",
        "example 0: joint 'twist': the member 'turn' is unknown; known are rotation, scale, "
        "translation"},
@@ -320,19 +333,6 @@ TEST(GltfRig, EachMistakeHasASentence) {
     expectMistake("{\"drivers\": [" + text + "]}", sentence);
   gltf::Model model = loaded(arm());
   EXPECT_EQ(gltf::applyRig(model, 1, "{}").error().code, ErrorCode::invalidArgument);
-}
-
-TEST(GltfRig, NotesJointsBelowADrivenOne) {
-  gltf::Model model = loaded(arm());
-  const std::size_t before = model.notes.size();
-  ASSERT_TRUE(gltf::applyRig(model, 0, R"({"drivers": [{"twist": "lower", "source": "upper",
-                                           "axis": [1, 0, 0]}]})")
-                  .ok());
-  ASSERT_EQ(model.notes.size(), before + 1);
-  EXPECT_EQ(
-      model.notes.back(),
-      "the rig of skin 0: 'twist' and 1 other joint below the driven joint 'lower' follow the "
-      "node, not the driver");
 }
 
 /// Text with many elements.
@@ -441,6 +441,19 @@ TEST(GltfRig, CountsPrimitivesTimesChains) {
                                            }) + "]}");
   ASSERT_FALSE(rig.ok());
   EXPECT_EQ(rig.error().code, ErrorCode::limitExceeded);
+}
+
+TEST(GltfRig, NotesJointsBelowADrivenOne) {
+  gltf::Model model = loaded(arm());
+  const std::size_t before = model.notes.size();
+  ASSERT_TRUE(gltf::applyRig(model, 0, R"({"drivers": [{"twist": "lower", "source": "upper",
+                                           "axis": [1, 0, 0]}]})")
+                  .ok());
+  ASSERT_EQ(model.notes.size(), before + 1);
+  EXPECT_EQ(
+      model.notes.back(),
+      "the rig of skin 0: 'twist' and 1 other joint below the driven joint 'lower' follow the "
+      "node, not the driver");
 }
 
 TEST(GltfRig, ASingularBindMatrixIsAMistakeOnlyIfADriverReadsIt) {

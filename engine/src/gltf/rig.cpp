@@ -247,6 +247,9 @@ class RigReader {
     corrective.radius = readFloat(driver, "radius", where_, corrective.radius);
     if (!(corrective.radius >= 0))
       failInvalid(in("radius"), " is ", double{corrective.radius}, ", which is negative");
+    if (corrective.radius == 0 && driver.contains("radius") && driver["radius"] != 0)
+      failInvalid(in("radius"), " is ", driver["radius"].get<double>(),
+                  ", which is too small for float32");
     json& examples = requireArray(driver, "examples", where_);
     if (examples.empty() || examples.size() > maxRigExamples)
       fail(examples.empty() ? ErrorCode::invalidData : ErrorCode::limitExceeded,
@@ -272,9 +275,15 @@ class RigReader {
           weights.emplace(weight.key(), weights.size());
       }
       if (example.contains("joints")) {
+        std::map<std::uint32_t, std::string> named;
         for (const auto& joint : requireObject(example, "joints", where).items()) {
           json name = joint.key();
-          joints.emplace(jointOf(name, join(where, ": joints")), joints.size());
+          const std::uint32_t number = jointOf(name, join(where, ": joints"));
+          joints.emplace(number, joints.size());
+          const auto [other, isNew] = named.emplace(number, joint.key());
+          if (!isNew)
+            failInvalid(where, ": joints: ", inQuotes(other->second), " and ",
+                        inQuotes(joint.key()), " are the same joint; write one of them");
         }
       }
     }
