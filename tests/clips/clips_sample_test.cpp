@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "clip_rig.h"
+#include "dermis/verify.h"
 #include "random_number.h"
 
 namespace dermis::test {
@@ -218,6 +219,78 @@ TEST_F(ClipsSample, TheTimeIsClipTime) {
     expectSame({{.clip = clip, .time = time, .hold = hold}},
                {{.clip = clip, .time = double{inside}, .hold = true}});
   }
+}
+
+// ---- The ends of the range of float32.
+
+/// A joint that a clip turns, and one below it, both at the origin.
+gltf::Model originRig() {
+  gltf::Model model;
+  model.nodes.resize(2);
+  model.nodes[1].parent = 0;
+  model.nodeOrder = {0, 1};
+  model.skins = {{"skin", {0, 1}, std::vector<JointMatrix>(2)}};
+  model.clips.push_back({"turn", 1, {}});
+  for (const std::uint32_t node : {0u, 1u}) {
+    model.clips[0].channels.push_back(
+        channel(node, ChannelPath::rotation, {0, 1}, {0, 0, 0, 1, 0, 0, 0.6f, 0.8f}));
+  }
+  return model;
+}
+
+std::vector<std::array<double, 2>> boundsOf(const PackedRig& rig, const ClipLayer& layer) {
+  const std::vector<std::span<const float>> masks(rig.masks.begin(), rig.masks.end());
+  const Result<reference::SampledPose> pose =
+      reference::samplePose(rig.skeleton, rig.clips, masks, {&layer, 1}, 0, &*rig.bank);
+  EXPECT_TRUE(pose.ok());
+  return pose->bounds;
+}
+
+// Exporters leave such noise. A GPU may flush denormals to 0.
+TEST(ClipsRange, BoundsAllowForDenormals) {
+  for (const double noise : {-3.3e-42, 1e-44, 1.1e-38}) {
+    PackedRig rig(originRig());
+    rig.skeleton.nodes[0].translation = {0, noise, 0};
+    rig.skeleton.nodes[1].scale = {noise, 1, 1};
+    rig.options.maxError = 1e-4;
+    ASSERT_TRUE(rig.pack());
+    for (const double time : {0.0, 0.3, 0.77}) {
+      rig.check(ClipLayer{.time = time});
+      for (const auto& [atJoint, perDistance] : boundsOf(rig, {.time = time})) {
+        EXPECT_GE(atJoint, 0x1p-125);
+        EXPECT_LE(atJoint, 1e-30);
+        EXPECT_LE(perDistance, 1e-3);
+      }
+    }
+  }
+}
+
+TEST(ClipsRange, BoundsAllowForTinyFactorsOfMasks) {
+  PackedRig rig(originRig());
+  rig.options.maxError = 1e-4;
+  rig.masks = {{1e-40f, 1}, {1e-30f, 1}};
+  ASSERT_TRUE(rig.pack());
+  // Flushed to 0, so that the joint rests.
+  EXPECT_TRUE(std::isinf(boundsOf(rig, {.time = 0.7, .mask = 1})[0][0]));
+  EXPECT_TRUE(std::isfinite(boundsOf(rig, {.time = 0.7, .mask = 2})[0][0]));
+}
+
+TEST(ClipsRange, NoBoundHoldsBeyondTheRange) {
+  PackedRig rig(originRig());
+  rig.skeleton.nodes[0].scale = rig.skeleton.nodes[1].scale = {1e20, 1e20, 1e20};
+  rig.options.maxError = 1e17;
+  ASSERT_TRUE(rig.pack());
+  std::vector<std::array<double, 2>> bounds = boundsOf(rig, {.time = 0.3});
+  for (const double bound : bounds[0]) EXPECT_TRUE(std::isfinite(bound));
+  for (const double bound : bounds[1]) EXPECT_TRUE(std::isinf(bound));
+  // An additive clip may reach it between its layers.
+  rig.skeleton.nodes[1].scale = {1, 1, 1};
+  const Floats times{0}, large{1e38f, 0, 0};
+  rig.clips[0].additive = true;
+  rig.clips[0].channels = {{0, ChannelPath::translation, Interpolation::linear, times, large}};
+  ASSERT_TRUE(rig.pack());
+  bounds = boundsOf(rig, {.weight = 30});
+  for (const double bound : bounds[0]) EXPECT_TRUE(std::isinf(bound));
 }
 
 TEST(ClipTime, WrapsInDoublePrecision) {

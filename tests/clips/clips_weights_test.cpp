@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <limits>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "clip_rig.h"
+#include "dermis/verify.h"
 #include "random_number.h"
 #include "scene_meshes.h"
 
@@ -244,6 +246,29 @@ TEST(ClipsWeights, RefusesWhatDoesNotFit) {
   refuses({&missing, 1}, arm::prop, 4, "layer 0: there is no clip 1");
   refuses(many, arm::prop, 4, "5 layers");
   EXPECT_TRUE(sampleWeights(*rig.bank, {}, arm::nodeCount, {}).ok());
+}
+
+// A GPU may flush denormals to 0.
+TEST(ClipsWeights, BoundsAllowForTheEndsOfTheRange) {
+  gltf::Model model = faceRig();
+  model.clips[0].channels[0].values = {1e-44f, -3.3e-42f, 1e-38f, 0, 1e-44f, -3.3e-42f,
+                                       1e-38f, 3e38f,     0,      0, 0,      3e38f};
+  PackedRig rig(std::move(model));
+  rig.clips.push_back(rig.clips[0]);
+  rig.clips[1].additive = true;
+  rig.options.maxWeightError = 1e32;
+  ASSERT_TRUE(rig.pack());
+  for (const std::uint32_t clip : {0u, 1u}) {
+    const ClipLayer layer{.clip = clip, .time = 1, .weight = 2};
+    const reference::SampledWeights weights = must(
+        reference::sampleWeights(rig.skeleton, rig.clips, {}, {&layer, 1}, arm::prop, &*rig.bank));
+    for (const std::size_t i : {0u, 1u, 2u}) EXPECT_GE(weights.bounds[i], 0x1p-125);
+    EXPECT_TRUE(std::isinf(weights.bounds[3]));
+  }
+  const reference::SampledWeights rest =
+      must(reference::sampleWeights(rig.skeleton, rig.clips, {}, {}, arm::prop, &*rig.bank));
+  EXPECT_GE(rest.bounds[0], 0x1p-126);
+  EXPECT_LE(rest.bounds[3], 1e-30);
 }
 
 }  // namespace

@@ -432,6 +432,22 @@ TEST(ReferenceClips, ParentsAreInAnyOrderAndMayHaveMatrices) {
   expectNear(rig.moved({{}}, {0, 2, 0}), {-4, 9, 3}, 1e-14);
 }
 
+// It would take long to seek the channels of each node among those of all.
+TEST(ReferenceClips, ManyNodesWithChannels) {
+  Rig rig;
+  rig.addHold(translation, {0, 4, 1});
+  rig.skeleton.nodes.resize(100'000);
+  ClipView& clip = rig.clips[0];
+  const ChannelView hold = clip.channels[0];
+  clip.channels.clear();
+  for (std::uint32_t node = 1; node < rig.skeleton.nodes.size(); ++node) {
+    clip.channels.push_back(hold);
+    clip.channels.back().node = node;
+  }
+  std::ranges::reverse(clip.channels);
+  expectNear(rig.hand({{}}), {0, 2, 1}, 1e-15);
+}
+
 // ---- What is refused.
 
 void expectRefused(const Result<reference::SampledPose>& pose, const std::string& words) {

@@ -22,6 +22,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "clips/bank.h"
 #include "dermis/clips.h"
 #include "dermis/verify.h"
 #include "strict_floating_point.h"
@@ -38,9 +39,35 @@ using glm::dquat;
 using glm::dvec3;
 using glm::dvec4;
 
-constexpr double u = 0x1p-24;  // half the distance from 1 to the next number of float32
+constexpr double u = 0x1p-24;          // half the distance from 1 to the next number of float32
+constexpr double denormal = 0x1p-126;  ///< a GPU may flush smaller numbers to 0
+constexpr double mostSize = 0x1p126;   ///< larger numbers may overflow
+constexpr double noBound = std::numeric_limits<double>::infinity();
+/// Of a vector or a matrix that is computed from a few others: 64 numbers are flushed.
+constexpr double flushedMatrix = 64 * denormal;
+/// Of a vector between keys: its three steps, which are multiplied by less than 2^21, and others.
+constexpr double flushedVector = 0x1p22 * denormal;
 
 // ---- The local transforms of nodes as clips have them.
+
+/// A clip with its channels by node.
+class Clip {
+ public:
+  explicit Clip(const ClipView& view) : view_(&view) {
+    for (const ChannelView& channel : view.channels) channels_.push_back(&channel);
+    std::ranges::stable_sort(channels_, {}, &ChannelView::node);
+  }
+
+  const ClipView* operator->() const { return view_; }
+  std::span<const ChannelView* const> channelsOf(std::uint32_t node) const {
+    const auto found = std::ranges::equal_range(channels_, node, {}, &ChannelView::node);
+    return {found.begin(), found.end()};
+  }
+
+ private:
+  const ClipView* view_;
+  std::vector<const ChannelView*> channels_;
+};
 
 /// The local transform of a node. The rotation is a unit quaternion.
 struct Local {
@@ -103,15 +130,15 @@ dvec4 valueAt(const ChannelView& channel, double time) {
 }
 
 /// The morph weight `number` of a node in a clip.
-double weightAt(const Skeleton& skeleton, std::uint32_t node, std::size_t number,
-                const ClipView& clip, double time) {
+double weightAt(const Skeleton& skeleton, std::uint32_t node, std::size_t number, const Clip& clip,
+                double time) {
   const std::span<const float> rest = skeleton.nodes[node].weights;
-  for (const ChannelView& channel : clip.channels) {
-    if (channel.node != node || channel.path != ChannelPath::weights) continue;
+  for (const ChannelView* const channel : clip.channelsOf(node)) {
+    if (channel->path != ChannelPath::weights) continue;
     return interpolated(
-        channel, time,
+        *channel, time,
         [&](std::size_t key, Part part) {
-          return numberOf(channel, rest.size(), key, part, number);
+          return numberOf(*channel, rest.size(), key, part, number);
         },
         [](double from, double to, double s) { return (1 - s) * from + s * to; });
   }
@@ -126,14 +153,14 @@ Local restOf(const SkeletonNode& node) {
 }
 
 /// The local transform that a clip gives a node of the skeleton.
-Local localAt(const Skeleton& skeleton, std::uint32_t node, const ClipView& clip, double time) {
+Local localAt(const Skeleton& skeleton, std::uint32_t node, const Clip& clip, double time) {
   Local local = restOf(skeleton.nodes[node]);
-  for (const ChannelView& channel : clip.channels) {
-    if (channel.node != node || channel.path == ChannelPath::weights) continue;
-    const dvec4 found = valueAt(channel, time);
-    if (channel.path == ChannelPath::translation) local.translation = dvec3(found);
-    if (channel.path == ChannelPath::rotation) local.rotation = toRotation(found);
-    if (channel.path == ChannelPath::scale) local.scale = dvec3(found);
+  for (const ChannelView* const channel : clip.channelsOf(node)) {
+    if (channel->path == ChannelPath::weights) continue;
+    const dvec4 found = valueAt(*channel, time);
+    if (channel->path == ChannelPath::translation) local.translation = dvec3(found);
+    if (channel->path == ChannelPath::rotation) local.rotation = toRotation(found);
+    if (channel->path == ChannelPath::scale) local.scale = dvec3(found);
   }
   return local;
 }
@@ -188,7 +215,7 @@ struct Carrier {
   }
 
   /// From −2π to 2π: the turn about the up axis of the rotation since the beginning.
-  double heading(const ClipView& clip, double time) const {
+  double heading(const Clip& clip, double time) const {
     const dquat start = localAt(skeleton, node, clip, 0).rotation;
     const dquat now = localAt(skeleton, node, clip, time).rotation;
     const dquat since = turned * now * glm::conjugate(start) * glm::conjugate(turned);
@@ -196,11 +223,11 @@ struct Carrier {
     return 2 * std::atan2(axis[static_cast<std::size_t>(up)], since.w);
   }
   /// The same, with whole turns: followed from the beginning.
-  double wholeHeading(const ClipView& clip, double time) const {
+  double wholeHeading(const Clip& clip, double time) const {
     std::vector<double> times{0, time};
-    for (const ChannelView& channel : clip.channels) {
-      if (channel.node != node || channel.path != ChannelPath::rotation) continue;
-      for (const float key : channel.times)
+    for (const ChannelView* const channel : clip.channelsOf(node)) {
+      if (channel->path != ChannelPath::rotation) continue;
+      for (const float key : channel->times)
         if (double{key} > 0 && double{key} < time) times.push_back(double{key});
     }
     std::sort(times.begin(), times.end());
@@ -215,12 +242,12 @@ struct Carrier {
     }
     return whole;
   }
-  dvec3 ground(const ClipView& clip, double time) const {
+  dvec3 ground(const Clip& clip, double time) const {
     dvec3 place(above * dvec4(localAt(skeleton, node, clip, time).translation, 1));
     place[up] = 0;
     return place;
   }
-  dmat4 motion(const ClipView& clip, double time) const {
+  dmat4 motion(const Clip& clip, double time) const {
     dvec3 axis(0.0);
     axis[up] = 1;
     dmat4 result(glm::mat3_cast(glm::angleAxis(heading(clip, time), axis)));
@@ -228,7 +255,7 @@ struct Carrier {
     return result;
   }
   /// What remains.
-  Local inPlace(const ClipView& clip, double time) const {
+  Local inPlace(const Clip& clip, double time) const {
     Local local = localAt(skeleton, node, clip, time);
     const dmat4 taken = motion(clip, time);
     local.translation =
@@ -299,10 +326,10 @@ Result<void> checkSkin(const Skeleton& skeleton, std::uint32_t skin) {
 
 /// A layer, ready to be sampled.
 struct Layer {
-  const ClipView* clip = nullptr;
-  const ClipView* base = nullptr;  ///< null: the rest pose
-  double time = 0, baseTime = 0;   ///< inside the clips
-  double weight = 0;               ///< of float16
+  Clip clip;
+  std::optional<Clip> base = {};  ///< none: the rest pose
+  double time = 0, baseTime = 0;  ///< inside the clips
+  double weight = 0;              ///< of float16
   const float* mask = nullptr;
 
   double factor(std::uint32_t node) const {
@@ -323,13 +350,13 @@ Result<Layer> toLayer(const ClipLayer& from, std::span<const ClipView> clips,
   if (from.weight < 0 && !clip.additive)
     return refused("the weight is negative, but the clip is not additive");
 
-  Layer layer{.clip = &clip, .time = timeInClip(clip, from.time, from.hold)};
+  Layer layer{.clip = Clip(clip), .time = timeInClip(clip, from.time, from.hold)};
   layer.weight = roundToHalf(double{from.weight});
   if (std::abs(layer.weight) > 65504) return refused("the weight is too large for float16");
   if (from.mask > 0) layer.mask = masks[from.mask - 1].data();
   if (clip.additive && clip.baseClip < clips.size()) {
-    layer.base = &clips[clip.baseClip];
-    layer.baseTime = timeInClip(*layer.base, clip.baseTime, true);
+    layer.base.emplace(clips[clip.baseClip]);
+    layer.baseTime = timeInClip(clips[clip.baseClip], clip.baseTime, true);
   }
   return layer;
 }
@@ -341,6 +368,9 @@ Result<Layer> toLayer(const ClipLayer& from, std::span<const ClipView> clips,
 // it by an arc whose sine is at most that, divided by |Σ w q|; its rotation turns by twice the arc.
 // lerp(1, difference, w) is such a sum in which the first part is exact. If errors decide about the
 // hemisphere, the rotation may be any.
+//
+// Denormals: a kernel may take a factor of less than 2^-126 for 0. So each share of the sum is off
+// by that, divided by the sum.
 //
 // float32: a weighted mean has at most 11 roundings of each part. 16 u of its parts cover them,
 // also for quaternions, at 2 × 5 roundings. A product of two quaternions and the interpolation
@@ -355,6 +385,18 @@ double largestOf(const dvec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
+/// How far the shares of at most four factors are off together because denormals are flushed.
+double flushedShares(double total) {
+  return total > 64 * denormal ? 16 * denormal * (1 + 1 / total) : noBound;
+}
+
+/// The numbers of `local` may overflow: then no error is too large.
+void checkRange(const Local& local, LocalError& error) {
+  if (!(glm::length(local.translation) + error.translation <= mostSize))
+    error.translation = noBound;
+  if (!(largestOf(local.scale) + error.scale <= mostSize)) error.scale = noBound;
+}
+
 /// The angle by which a sum of quaternions turns if its parts are off by `angle` together.
 double turnOf(double angle, const dquat& sum, bool eitherHemisphere) {
   if (eitherHemisphere) return std::numbers::pi;
@@ -366,42 +408,51 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
   const double angle = double{clipError.rotation} + 16 * u;
   Local sum{dvec3(0.0), dquat(0, 0, 0, 0), dvec3(0.0)};
   dquat first(1, 0, 0, 0);
-  double total = 0, translations = 0, scales = 0;
+  double total = 0, translations = 0, scales = 0, farthest = 0, largest = 0;
   bool eitherHemisphere = false;
   for (const Layer& layer : layers) {
     const double factor = layer.factor(node);
     if (layer.clip->additive || factor == 0) continue;
     const bool isCarrier = carrier != nullptr && carrier->node == node;
-    const Local local = isCarrier ? carrier->inPlace(*layer.clip, layer.time)
-                                  : localAt(skeleton, node, *layer.clip, layer.time);
+    const Local local = isCarrier ? carrier->inPlace(layer.clip, layer.time)
+                                  : localAt(skeleton, node, layer.clip, layer.time);
     if (total == 0) first = local.rotation;
     const double cosine = glm::dot(first, local.rotation);
-    eitherHemisphere |= std::abs(cosine) <= angle;
+    eitherHemisphere |= std::abs(cosine) <= angle || factor < 2 * denormal;
     total += factor;
     sum.translation += factor * local.translation;
     sum.rotation = sum.rotation + local.rotation * (cosine < 0 ? -factor : factor);
     sum.scale += factor * local.scale;
     translations += factor * glm::length(local.translation);
     scales += factor * largestOf(local.scale);
+    farthest = std::max(farthest, glm::length(local.translation));
+    largest = std::max(largest, largestOf(local.scale));
   }
   if (total == 0) {
     const Local rest = restOf(skeleton.nodes[node]);
-    error = {16 * u * glm::length(rest.translation), 32 * u, 16 * u * largestOf(rest.scale)};
+    error = {16 * u * glm::length(rest.translation) + flushedMatrix, 32 * u,
+             16 * u * largestOf(rest.scale) + flushedMatrix};
+    checkRange(rest, error);
     return rest;
   }
-  error.translation = double{clipError.translation} + 16 * u * translations / total;
-  error.rotation = turnOf(total * angle, sum.rotation, eitherHemisphere) + 32 * u;
-  error.scale = double{clipError.scale} + 16 * u * scales / total;
-  return {sum.translation / total, glm::normalize(sum.rotation), sum.scale / total};
+  const double shares = flushedShares(total);
+  error.translation = double{clipError.translation} + 16 * u * translations / total +
+                      flushedVector + shares * farthest;
+  error.rotation = turnOf(total * (angle + 2 * shares), sum.rotation, eitherHemisphere) + 32 * u;
+  error.scale =
+      double{clipError.scale} + 16 * u * scales / total + flushedVector + shares * largest;
+  const Local mean{sum.translation / total, glm::normalize(sum.rotation), sum.scale / total};
+  checkRange(mean, error);
+  return mean;
 }
 
 void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
          const ClipError& clipError, Local& local, LocalError& error) {
   const double factor = layer.factor(node), size = std::abs(factor);
   if (!layer.clip->additive || factor == 0) return;
-  const Local base = layer.base != nullptr ? localAt(skeleton, node, *layer.base, layer.baseTime)
-                                           : restOf(skeleton.nodes[node]);
-  const Local difference = differenceOf(localAt(skeleton, node, *layer.clip, layer.time), base);
+  const Local base = layer.base ? localAt(skeleton, node, *layer.base, layer.baseTime)
+                                : restOf(skeleton.nodes[node]);
+  const Local difference = differenceOf(localAt(skeleton, node, layer.clip, layer.time), base);
 
   const double angle = double{clipError.rotation} + 16 * u;
   const dquat turn = dquat(1 - factor, 0, 0, 0) + difference.rotation * factor;
@@ -410,15 +461,19 @@ void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
 
   local.translation += factor * difference.translation;
   error.translation +=
-      size * double{clipError.translation} +
-      4 * u * (glm::length(local.translation) + size * glm::length(difference.translation));
+      size * (double{clipError.translation} + flushedVector) +
+      4 * u * (glm::length(local.translation) + size * glm::length(difference.translation)) +
+      denormal * glm::length(difference.translation) + flushedMatrix;
 
   const dvec3 growth = 1.0 + factor * (difference.scale - 1.0);
-  const double growthError =
-      size * double{clipError.scale} + 4 * u * (1 + size * largestOf(difference.scale - 1.0));
-  error.scale =
-      error.scale * largestOf(growth) + (largestOf(local.scale) + error.scale) * growthError;
+  const double growthError = size * (double{clipError.scale} + flushedVector) +
+                             4 * u * (1 + size * largestOf(difference.scale - 1.0)) +
+                             denormal * largestOf(difference.scale - 1.0) + flushedMatrix;
+  error.scale = error.scale * largestOf(growth) +
+                (largestOf(local.scale) + error.scale) * growthError + flushedMatrix;
+  if (!(largestOf(growth) <= mostSize)) error.scale = noBound;
   local.scale *= growth;
+  checkRange(local, error);
 }
 
 // ---- The skeleton.
@@ -437,6 +492,11 @@ void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
 // i, and T_i = Σ P_i-1 |translation of M~_i|, this is at most 12 u (P_i |y| + T_i). 16 u of them,
 // once for each node and once for the inverse bind matrix, cover the rounding of factors as well,
 // whichever nodes the bank folds into others.
+//
+// Denormals: each number of a matrix that is stored, read or computed on the way to node i may be
+// off by 2^-126 for each of its products and sums. What is left of that matrix is a G of a node
+// above i; what is right of it is y_i. If a product of sizes is too large for float32, there is no
+// bound.
 
 struct PosedNode {
   dmat4 local{1.0}, global{1.0};
@@ -445,22 +505,31 @@ struct PosedNode {
   double stretch = 1;          ///< ‖G~‖ at most
   double product = 1;          ///< P
   double span = 0;             ///< T
+  double above = 1;            ///< 1, and ‖G~‖ of all nodes above at most
+  bool mayOverflow = false;
 };
+
+double sumOfSizes(const dmat4& matrix) {
+  double sum = 0;
+  for (glm::length_t column = 0; column < 4; ++column)
+    for (glm::length_t row = 0; row < 3; ++row) sum += std::abs(matrix[column][row]);
+  return sum;
+}
 
 double normOf(const dmat4& matrix) {
   return singularValues(dmat3(matrix)).values[0];
 }
 
 PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer> layers,
-                   const PosedNode& above, const PackedClips* bank, const Carrier* carrier) {
+                   const PosedNode& above, const ClipError* clipError, const Carrier* carrier) {
   PosedNode posed;
   if (skeleton.nodes[node].matrix) {
     posed.local = toMatrix(*skeleton.nodes[node].matrix);
   } else {
-    const ClipError clipError = bank != nullptr ? bank->error(node) : ClipError{};
+    const ClipError bankError = clipError != nullptr ? *clipError : ClipError{};
     LocalError error;
-    Local local = blend(skeleton, node, layers, clipError, carrier, error);
-    for (const Layer& layer : layers) add(skeleton, node, layer, clipError, local, error);
+    Local local = blend(skeleton, node, layers, bankError, carrier, error);
+    for (const Layer& layer : layers) add(skeleton, node, layer, bankError, local, error);
     posed.local = dmat4(glm::mat3_cast(local.rotation));
     for (glm::length_t i = 0; i < 3; ++i) posed.local[i] *= local.scale[i];
     posed.local[3] = {local.translation, 1};
@@ -468,12 +537,18 @@ PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const
     posed.turn = error.rotation * largestOf(local.scale) + error.scale;
   }
   posed.global = above.global * posed.local;
-  if (bank == nullptr) return posed;
+  if (clipError == nullptr) return posed;
+  posed.mayOverflow =
+      above.mayOverflow || !(sumOfSizes(posed.local) + posed.shift + posed.turn <= mostSize);
+  if (posed.mayOverflow) return posed;
   const double norm = normOf(posed.local);
   posed.product = above.product * (norm + posed.turn);
   posed.span = above.span + above.product * (glm::length(dvec3(posed.local[3])) + posed.shift);
-  posed.drift = above.drift * norm + above.stretch * posed.turn + 16 * u * posed.product;
-  posed.stretch = normOf(posed.global) + posed.drift;
+  posed.above = std::max(above.above, above.stretch);
+  posed.drift = above.drift * norm + above.stretch * posed.turn + 16 * u * posed.product +
+                flushedMatrix * posed.above;
+  posed.mayOverflow = !(posed.product <= mostSize) || !(posed.span <= mostSize);
+  if (!posed.mayOverflow) posed.stretch = normOf(posed.global) + posed.drift;
   return posed;
 }
 
@@ -482,20 +557,24 @@ std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
                               const dmat4& inverseBind) {
   // p = L⁻¹ (x − t), with L the linear part of the inverse bind matrix and t its translation.
   const dvec3 values = singularValues(dmat3(inverseBind)).values;
-  const double infinite = std::numeric_limits<double>::infinity();
-  if (values[2] == 0) return {infinite, infinite};
   const dvec3 t(inverseBind[3]);
-  const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
   const PosedNode& last = nodes[joint];
-  double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span);
-  double perDistance = 16 * u * last.product * values[0] / values[2];
+  const double size = last.product * (values[0] + glm::length(t)) + last.span;
+  if (values[2] == 0 || last.mayOverflow || !(size <= mostSize)) return {noBound, noBound};
+  const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
+  const double flushedJoint = flushedMatrix * std::max(last.above, last.stretch);
+  double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span) +
+                   flushedJoint * (1 + bind);
+  double perDistance = (16 * u * last.product * values[0] + flushedJoint) / values[2];
 
   dmat4 below(1.0);  // from the frame of the joint
   for (std::uint32_t node = joint; node != noJoint; node = parents[node]) {
     const PosedNode& posed = nodes[node];
     const double stretch = parents[node] != noJoint ? nodes[parents[node]].stretch : 1;
-    const double turn = stretch * posed.turn + 16 * u * posed.product;
-    atJoint += stretch * posed.shift + 16 * u * posed.span + turn * glm::length(dvec3(below[3]));
+    const double flushedNode = flushedMatrix * posed.above;
+    const double turn = stretch * posed.turn + 16 * u * posed.product + flushedNode;
+    atJoint += stretch * posed.shift + 16 * u * posed.span + flushedNode +
+               turn * glm::length(dvec3(below[3]));
     perDistance += turn * normOf(below);
     below = posed.local * below;
   }
@@ -521,6 +600,18 @@ Result<std::vector<Layer>> toLayers(const Skeleton& skeleton, std::span<const Cl
   return resolved;
 }
 
+/// Of each node of the skeleton.
+std::vector<ClipError> errorsOf(const PackedClips& bank, std::size_t nodeCount) {
+  std::vector<ClipError> errors(nodeCount);
+  const ClipBank read(bank);
+  for (std::size_t i = 0; i < read.header.nodeCount; ++i) {
+    const BankNode node = read.node(i);
+    if (node.source < nodeCount)
+      errors[node.source] = {node.translationError, node.rotationError, node.scaleError, 0};
+  }
+  return errors;
+}
+
 }  // namespace
 
 Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
@@ -540,10 +631,14 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
     return refused("root motion names a node or an axis that does not exist");
   std::optional<Carrier> carrier;
   if (rootMotion != nullptr) carrier.emplace(skeleton, *rootMotion);
+  std::vector<ClipError> errors;
+  if (bank != nullptr) errors = errorsOf(*bank, parents.size());
   std::vector<PosedNode> nodes(parents.size());
   for (const std::uint32_t node : order) {
     const PosedNode above = parents[node] != noJoint ? nodes[parents[node]] : PosedNode();
-    nodes[node] = poseNode(skeleton, node, *resolved, above, bank, carrier ? &*carrier : nullptr);
+    nodes[node] =
+        poseNode(skeleton, node, *resolved, above, bank != nullptr ? &errors[node] : nullptr,
+                 carrier ? &*carrier : nullptr);
   }
   SampledPose pose;
   const SkeletonSkin& posedSkin = skeleton.skins[skin];
@@ -575,11 +670,11 @@ Result<SampledMotion> rootMotion(const Skeleton& skeleton, std::span<const ClipV
   if (!std::isfinite(fromSeconds) || !std::isfinite(toSeconds))
     return refused("a time is not finite");
   SampledMotion result;
-  const ClipView& played = clips[clip];
-  if (played.additive) return result;
+  const Clip played(clips[clip]);
+  if (played->additive) return result;
   const Carrier carrier(skeleton, options);
-  const double duration = double{static_cast<float>(played.duration)};
-  const bool wraps = played.wraps && !hold && duration > 0;
+  const double duration = double{static_cast<float>(played->duration)};
+  const bool wraps = played->wraps && !hold && duration > 0;
   const auto loopOf = [&](double seconds) { return wraps ? std::floor(seconds / duration) : 0; };
   const auto timeOf = [&](double seconds) {
     return std::clamp(seconds - loopOf(seconds) * duration, 0.0, duration);
@@ -610,8 +705,8 @@ Result<SampledMotion> rootMotion(const Skeleton& skeleton, std::span<const ClipV
   return result;
 }
 
-// The bank's weights are off by the `ClipError` e of the node, so their mean is, too. float32: as
-// for translations above.
+// The bank's weights are off by the `ClipError` e of the node, so their mean is, too. float32 and
+// denormals: as for translations above.
 Result<SampledWeights> sampleWeights(const Skeleton& skeleton, std::span<const ClipView> clips,
                                      std::span<const std::span<const float>> masks,
                                      std::span<const ClipLayer> layers, std::uint32_t node,
@@ -622,28 +717,35 @@ Result<SampledWeights> sampleWeights(const Skeleton& skeleton, std::span<const C
   if (node >= skeleton.nodes.size()) return result;
   const double clipError = bank != nullptr ? double{bank->error(node).weight} : 0;
   for (std::size_t number = 0; number < skeleton.nodes[node].weights.size(); ++number) {
-    const auto at = [&](const ClipView& clip, double time) {
+    const auto at = [&](const Clip& clip, double time) {
       return weightAt(skeleton, node, number, clip, time);
     };
     const double rest = double{skeleton.nodes[node].weights[number]};
-    double total = 0, sum = 0, sizes = 0;
+    double total = 0, sum = 0, sizes = 0, largest = 0;
     for (const Layer& layer : *resolved) {
       if (layer.clip->additive) continue;
-      const double factor = layer.factor(node), value = at(*layer.clip, layer.time);
+      const double factor = layer.factor(node), value = at(layer.clip, layer.time);
       total += factor;
       sum += factor * value;
       sizes += factor * std::abs(value);
+      if (factor > 0) largest = std::max(largest, std::abs(value));
     }
-    double weight = total > 0 ? sum / total : rest;
-    double bound = total > 0 ? clipError + 16 * u * sizes / total : 0;
+    double weight = total > 0 ? sum / total : rest, bound = denormal;
+    if (total > 0) {
+      bound = clipError + 16 * u * sizes / total + flushedVector + flushedShares(total) * largest;
+    }
     for (const Layer& layer : *resolved) {
       if (!layer.clip->additive) continue;
-      const double base = layer.base != nullptr ? at(*layer.base, layer.baseTime) : rest;
+      const double base = layer.base ? at(*layer.base, layer.baseTime) : rest;
       const double factor = layer.factor(node), size = std::abs(factor);
-      const double difference = at(*layer.clip, layer.time) - base;
+      const double difference = at(layer.clip, layer.time) - base;
+      if (!(std::abs(weight) + bound <= mostSize)) bound = noBound;
       weight += factor * difference;
-      bound += size * clipError + 4 * u * (std::abs(weight) + size * std::abs(difference));
+      bound += size * (clipError + flushedVector) +
+               4 * u * (std::abs(weight) + size * std::abs(difference)) +
+               denormal * std::abs(difference) + flushedMatrix;
     }
+    if (!(std::abs(weight) + bound <= mostSize)) bound = noBound;
     result.weights.push_back(weight);
     if (bank != nullptr) result.bounds.push_back(bound);
   }
