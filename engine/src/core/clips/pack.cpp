@@ -527,6 +527,7 @@ class Packer {
   std::vector<Needs> needsOf(std::size_t number, const std::vector<std::array<Curve, 3>>& curves,
                              double duration) const {
     std::vector<Needs> needs(moved_.size());
+    std::vector<double> own(moved_.size()), all(moved_.size()), farthest(moved_.size());
     constexpr int steps = 32;
     for (int step = 0; step <= steps; ++step) {
       const double time = step * duration / steps;
@@ -538,16 +539,35 @@ class Packer {
             node.parent == noNode ? node.fixed : multiply(globals[node.parent], node.fixed));
         needs[i].above = std::max(needs[i].above, above);
         const double grown = scaleOf(globals[i]) / std::max(scaleOf(node.global), 1e-30);
-        for (auto up = static_cast<std::uint32_t>(i); up != noNode; up = moved_[up].parent) {
-          const double reach =
-              apart(originOf(globals[up]), originOf(globals[i])) + node.reach * grown;
-          needs[up].reach = std::max(needs[up].reach, reach);
-          needs[up].localReach =
-              std::max(needs[up].localReach, reach / std::max(scaleOf(globals[up]), 1e-30));
-        }
+        own[i] = all[i] = node.reach * grown;
+      }
+      std::ranges::fill(farthest, 0.0);
+      for (std::size_t i = moved_.size(); i-- > 0;)
+        reachFrom(static_cast<std::uint32_t>(i), globals, own[i], all, farthest);
+      for (std::size_t i = 0; i < moved_.size(); ++i) {
+        needs[i].reach = std::max(needs[i].reach, farthest[i]);
+        needs[i].localReach =
+            std::max(needs[i].localReach, farthest[i] / std::max(scaleOf(globals[i]), 1e-30));
       }
     }
     return needs;
+  }
+
+  /// Lets a node and those above it reach what hangs on the node: at the distance `own` from it,
+  /// and, together with all nodes below it, at most at `all`. So that long chains take linear time,
+  /// nodes far above reach as far as that bound.
+  void reachFrom(std::uint32_t node, const std::vector<Transform>& globals, double own,
+                 std::vector<double>& all, std::vector<double>& farthest) const {
+    const auto extend = [&](double& reach, std::uint32_t from, double beyond) {
+      reach = std::max(reach, apart(originOf(globals[from]), originOf(globals[node])) + beyond);
+    };
+    constexpr int exactAncestors = 64;
+    std::uint32_t up = node;
+    for (int i = 0; i < exactAncestors && up != noNode; ++i, up = moved_[up].parent)
+      extend(farthest[up], up, own);
+    if (up != noNode) extend(farthest[up], up, all[node]);
+    if (const std::uint32_t parent = moved_[node].parent; parent != noNode)
+      extend(all[parent], parent, all[node]);
   }
 
   std::size_t morphGroups() const {
