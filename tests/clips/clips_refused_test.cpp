@@ -297,5 +297,35 @@ TEST(ClipsRefused, NumbersBeyondFloat32) {
                 {"float32"}, ErrorCode::limitExceeded);
 }
 
+// What is not clamped to a range of float32 has no integer.
+TEST(ClipsRefused, KeysBeyondFloat32) {
+  const Floats times{0, 0.5f, 1}, moved{3e38f, 0, 0, -3e38f, 0, 0, 3e38f, 0, 0};
+  const std::vector<std::string> names{"huge", "stand", "float32"};
+  for (const Interpolation interpolation : {Interpolation::linear, Interpolation::step}) {
+    PackedRig rig(armRig());
+    rig.clips.assign(1, ClipView{.name = "huge", .duration = 1, .channels = {}});
+    rig.clips[0].channels = {{arm::stand, ChannelPath::translation, interpolation, times, moved}};
+    rig.options.maxError = 1e30;
+    expectRefused(rig, ErrorCode::limitExceeded, names);
+    // A quotient of scales.
+    const Floats first{0}, tiny{1e-42f, 1, 1}, scales{1e30f, 1, 1, 2e30f, 1, 1, 1e30f, 1, 1};
+    rig.clips.push_back(rig.clips[0]);
+    rig.clips[0].channels[0] = {arm::stand, ChannelPath::scale, interpolation, first, tiny};
+    rig.clips[1].channels[0] = {arm::stand, ChannelPath::scale, interpolation, times, scales};
+    rig.clips[1].additive = true;
+    rig.clips[1].baseClip = 0;
+    expectRefused(rig, ErrorCode::limitExceeded, names);
+  }
+  const Floats rest{0};
+  const Floats weights{3e38f, -3e38f, 3e38f};
+  PackedRig rig(armRig());
+  rig.clips.assign(1, ClipView{.name = "huge", .duration = 1, .channels = {}});
+  rig.skeleton.nodes[arm::stand].weights = rest;
+  rig.options.maxWeightError = 1e30;
+  rig.clips[0].channels = {
+      {arm::stand, ChannelPath::weights, Interpolation::linear, times, weights}};
+  expectRefused(rig, ErrorCode::limitExceeded, names);
+}
+
 }  // namespace
 }  // namespace dermis::test

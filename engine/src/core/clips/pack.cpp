@@ -389,8 +389,8 @@ class Packer {
     const double tolerance =
         maxError_ / (8 * std::max(1.0, needs[carrier_].reach / double{motion_->length}));
     std::optional<Track> track = fitTrack(curve, Value{}, duration, packed.rate, tolerance);
-    if (!track)
-      return unkept(where(number, options_.rootMotion->node), "maxError", maxError_, packed.rate);
+    if (Result<void> good = checkFit(track, number, options_.rootMotion->node, packed.rate); !good)
+      return good;
     // Both the place and the heading are relative to those at the beginning.
     const double error = 2 * (track->error + split->motionError) * (1 + 0x1p-23);
     motion_->translationError = std::max(motion_->translationError, static_cast<float>(error));
@@ -421,8 +421,8 @@ class Packer {
         const Curve curve(channel ? &*channel : nullptr, ChannelPath::translation, rest, base);
         std::optional<Track> track =
             fitTrack(curve, clip.additive ? Value{} : rest, duration, packed.rate, tolerance);
-        if (!track)
-          return unkept(where(number, node.source), "maxWeightError", tolerance, packed.rate);
+        if (Result<void> good = checkFit(track, number, node.source, packed.rate, tolerance); !good)
+          return good;
         if (!spend(*track)) return tooLarge(number);
         node.error = std::max(node.error, static_cast<float>(track->error * (1 + 0x1p-23)));
         packed.vectorTracks.push_back(*std::move(track));
@@ -473,8 +473,8 @@ class Packer {
         for (std::size_t p = 0; p < 3; ++p) {
           std::optional<Track> track =
               fitTrack(curves[i][p], stillOf(number, i)[p], duration, packed.rate, tolerances[p]);
-          if (!track)
-            return unkept(where(number, moved_[i].source), "maxError", maxError_, packed.rate);
+          if (Result<void> good = checkFit(track, number, moved_[i].source, packed.rate); !good)
+            return good.error();
           const bool isAtRest = track->kind == TrackKind::rest && track->error == 0;
           if (!isAtRest && !spend(*track)) return tooLarge(number);
           packed.tracks[i][p] =
@@ -500,6 +500,18 @@ class Packer {
       report.worst = where(number, moved_[worstNode].source) + ", at " + decimal(worstTime) + " s";
     }
     return packed;
+  }
+
+  /// `weightError`: the one of morph weights that was to be kept.
+  Result<void> checkFit(const std::optional<Track>& track, std::size_t clip, std::uint32_t node,
+                        double rate, std::optional<double> weightError = {}) const {
+    if (!track) {
+      return unkept(where(clip, node), weightError ? "maxWeightError" : "maxError",
+                    weightError.value_or(maxError_), rate);
+    }
+    if (std::isfinite(track->error)) return {};
+    return Error{ErrorCode::limitExceeded,
+                 "packClips: " + where(clip, node) + ": its keys are beyond the range of float32"};
   }
 
   static Error unkept(const std::string& where, const char* option, double error, double rate) {

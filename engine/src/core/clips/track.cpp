@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "strict_floating_point.h"
 
@@ -204,7 +205,8 @@ class Fit {
   bool isPossible_ = false;
 };
 
-void quantize(Track& track, const std::vector<Value>& values) {
+/// Returns false if the values, or the differences of two of them, may overflow.
+bool quantize(Track& track, const std::vector<Value>& values) {
   track.keys.clear();
   if (!track.format.isRotation) {
     Value low = values[0], high = values[0];
@@ -215,6 +217,7 @@ void quantize(Track& track, const std::vector<Value>& values) {
       }
     }
     for (std::size_t i = 0; i < 3; ++i) {
+      if (!(std::max({-low[i], high[i], high[i] - low[i]}) < 0x1.fffp127)) return false;
       track.range[i] = static_cast<float>(low[i]);
       track.range[4 + i] = static_cast<float>((high[i] - low[i]) / track.format.largest());
     }
@@ -223,6 +226,7 @@ void quantize(Track& track, const std::vector<Value>& values) {
     track.keys.push_back(track.format.isRotation ? rotationBits(value, track.format)
                                                  : vectorBits(value, track.format, track.range));
   }
+  return true;
 }
 
 std::vector<Value> decoded(const Track& track) {
@@ -299,6 +303,7 @@ std::optional<Track> fitTrack(const Curve& curve, const Value& rest, double dura
   if (!(duration > 0)) return std::nullopt;
   const std::vector<double> keyTimes = curve.keyTimes(duration);
   const std::vector<double> jumpTimes = curve.jumps(duration, tolerance / 4);
+  bool overflows = false;
   const int coarsest = std::clamp(static_cast<int>(std::ceil(std::log2(duration * rate))), 0, 20);
   for (int level = coarsest; level >= finestLevel; --level) {
     if (duration * rate / std::ldexp(1, level) > mostIntervals) break;
@@ -309,7 +314,10 @@ std::optional<Track> fitTrack(const Curve& curve, const Value& rest, double dura
     track.level = level;
     track.jumps = fit.jumps();
     for (track.format = {curve.isRotation(), 0}; track.format.size < 3; ++track.format.size) {
-      quantize(track, fit.values());
+      if (!quantize(track, fit.values())) {
+        overflows = true;
+        break;
+      }
       const std::vector<Value> keys = decoded(track);
       const double error = fit.errorOf(keys);
       if (error > tolerance) continue;
@@ -317,7 +325,10 @@ std::optional<Track> fitTrack(const Curve& curve, const Value& rest, double dura
       return track;
     }
   }
-  return std::nullopt;
+  if (!overflows) return std::nullopt;
+  Track track;
+  track.error = std::numeric_limits<double>::infinity();
+  return track;
 }
 
 }  // namespace dermis

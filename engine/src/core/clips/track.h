@@ -31,7 +31,7 @@ inline constexpr double mostIntervals = 1 << 20;    ///< of a clip at its finest
 inline constexpr double jumpClearance = 2.0 / 256;  ///< intervals in which a jump is rounded
 
 /// The smallest track that is off by `tolerance` at most, if there is one. `rest` is the value of a
-/// track without numbers.
+/// track without numbers. The error is infinite if keys leave the range of float32.
 std::optional<Track> fitTrack(const Curve& curve, const Value& rest, double duration, double rate,
                               double tolerance);
 
