@@ -6,6 +6,10 @@
 #include <filesystem>
 #include <utility>
 
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
+
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
@@ -304,6 +308,16 @@ void forEachMorphedModel(std::uint32_t maxClips,
     return !model.clips.empty();
   };
   EXPECT_GE(forEachModelWith(isWanted, maxClips, call), testDataFolder() ? 3u : 0u);
+}
+
+std::uint64_t peakKilobytes() {
+#ifdef __linux__
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss);
+#else
+  return 0;
+#endif
 }
 
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {

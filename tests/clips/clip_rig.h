@@ -106,6 +106,9 @@ void forEachAnimatedModel(std::uint32_t maxClips,
 void forEachMorphedModel(std::uint32_t maxClips,
                          const std::function<void(gltf::Model, std::uint32_t)>& call);
 
+/// The most memory that this process has used so far. 0 where that is unknown.
+std::uint64_t peakKilobytes();
+
 /// Whether two poses are the same bits.
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b);
 

@@ -352,5 +352,26 @@ TEST(ClipsRootMotion, RefusesWhatCannotWork) {
   refusesTimes(0, 0, 1e30, "a time is 2^52 loops away");
 }
 
+// What rounding makes of a path of this size is much more than its error may be. It must not be
+// split as long as that takes: half a minute, and 400 MB.
+TEST(ClipsRootMotion, TooFarForItsError) {
+  PackedRig rig(walker());
+  rig.options.rootMotion = {.node = 1, .upAxis = 1};
+  std::mt19937 random(1);
+  Floats times, values;
+  for (int key = 0; key < 4000; ++key) {
+    times.push_back(static_cast<float>(key) * 0.7f);
+    for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(between(random, -1e15, 1e15)));
+  }
+  rig.clips.assign(1, ClipView{.name = "far", .duration = double{times.back()}});
+  rig.clips[0].channels = {{1, ChannelPath::translation, Interpolation::linear, times, values}};
+  const std::uint64_t before = peakKilobytes();
+  const Result<PackedClips> packed = rig.tryToPack();
+  EXPECT_LT(peakKilobytes() - before, 60'000u);
+  ASSERT_FALSE(packed.ok());
+  EXPECT_EQ(packed.error().code, ErrorCode::limitExceeded);
+  EXPECT_NE(packed.error().message.find("'far'"), std::string::npos) << packed.error().message;
+}
+
 }  // namespace
 }  // namespace dermis::test

@@ -271,5 +271,21 @@ TEST(ClipsWeights, BoundsAllowForTheEndsOfTheRange) {
   EXPECT_LE(rest.bounds[3], 1e-30);
 }
 
+// Each copy of the base takes 2 MB or more.
+TEST(ClipsWeights, AdditiveClipsDoNotCopyTheirBase) {
+  gltf::Model model = faceRig();
+  constexpr std::size_t keys = 40'000;
+  gltf::Channel& base = model.clips[0].channels[0];
+  base.times.clear();
+  for (std::size_t key = 0; key < keys; ++key)
+    base.times.push_back(2 * static_cast<float>(key) / keys);
+  base.values.assign(4 * keys, 0.5f);
+  PackedRig rig(std::move(model));
+  rig.clips.resize(200, {.name = "added", .duration = 1, .additive = true, .baseClip = 0});
+  const std::uint64_t before = peakKilobytes();
+  ASSERT_TRUE(rig.pack());
+  EXPECT_LT(peakKilobytes() - before, 60'000u);
+}
+
 }  // namespace
 }  // namespace dermis::test

@@ -352,13 +352,14 @@ class Packer {
     return curves;
   }
 
-  /// The channel of the weights of a node in a clip for three of them, as if of a translation.
+  /// The channel of the weights of a node in a clip for three of them, as if of a translation. It
+  /// points to `values`.
   std::optional<ChannelView> groupChannel(std::size_t clip, const MorphedNode& node,
-                                          std::size_t group) {
+                                          std::size_t group, std::vector<float>& values) const {
     const ChannelView* const all = channelOf(clip, node.source, ChannelPath::weights);
     if (all == nullptr) return std::nullopt;
     const std::size_t count = skeleton_.nodes[node.source].weights.size();
-    std::vector<float>& values = changedKeys_.emplace_back();
+    values.clear();
     for (std::size_t first = 0; first < all->values.size(); first += count) {
       for (std::size_t k = 3 * group; k < 3 * group + 3; ++k)
         values.push_back(k < count ? all->values[first + k] : 0);
@@ -369,13 +370,27 @@ class Packer {
     return channel;
   }
 
-  /// Straight lines between keys of what is split get little of the error.
-  SplitMotion splitMotionOf(std::size_t number, double duration, const Needs& needs) const {
+  /// The weights, in groups, from which an additive clip is a difference.
+  std::vector<Value> baseWeights(const ClipView& clip, const MorphedNode& node) const {
+    std::vector<Value> base = node.rest;
+    if (clip.baseClip >= clips_.size()) return base;
+    const ChannelView* const all = channelOf(clip.baseClip, node.source, ChannelPath::weights);
+    if (all == nullptr) return base;
+    std::vector<double> weights(skeleton_.nodes[node.source].weights.size());
+    interpolate(*all, baseTimeOf(clip), weights);
+    for (std::size_t k = 0; k < weights.size(); ++k) base[k / 3][k % 3] = weights[k];
+    return base;
+  }
+
+  /// Straight lines between keys of what is split get little of the error. Empty if it takes more
+  /// memory than is left.
+  std::optional<SplitMotion> splitMotionOf(std::size_t number, double duration,
+                                           const Needs& needs) const {
     const MovedNode& node = moved_[carrier_];
     return splitMotion(*frame_, channelOf(number, node.source, ChannelPath::translation),
                        channelOf(number, node.source, ChannelPath::rotation), node.rest[0],
                        node.rest[1], duration, double{motion_->length}, maxError_ / 64,
-                       maxError_ / (64 * needs.reach));
+                       maxError_ / (64 * needs.reach), memoryLeft_);
   }
 
   /// Packs morph weights and the root motion.
@@ -405,19 +420,15 @@ class Packer {
   Result<void> packWeights(std::size_t number, double duration, FittedClip& packed) {
     const ClipView& clip = clips_[number];
     const double tolerance = options_.maxWeightError > 0 ? options_.maxWeightError : 1e-3;
+    std::vector<float> values;
     for (MorphedNode& node : morphed_) {
+      std::vector<Value> bases;
+      if (clip.additive) bases = baseWeights(clip, node);
       for (std::size_t group = 0; group < node.rest.size(); ++group) {
         const Value& rest = node.rest[group];
-        std::optional<Value> base;
-        if (clip.additive) {
-          base = rest;
-          if (clip.baseClip < clips_.size()) {
-            const auto channel = groupChannel(clip.baseClip, node, group);
-            base = Curve(channel ? &*channel : nullptr, ChannelPath::translation, rest, {})
-                       .at(baseTimeOf(clip));
-          }
-        }
-        const auto channel = groupChannel(number, node, group);
+        const std::optional<Value> base =
+            clip.additive ? std::optional(bases[group]) : std::nullopt;
+        const auto channel = groupChannel(number, node, group, values);
         const Curve curve(channel ? &*channel : nullptr, ChannelPath::translation, rest, base);
         std::optional<Track> track =
             fitTrack(curve, clip.additive ? Value{} : rest, duration, packed.rate, tolerance);
@@ -450,6 +461,7 @@ class Packer {
     std::optional<SplitMotion> split;
     if (carrier_ != noNode && !clips_[number].additive) {
       split = splitMotionOf(number, duration, needs[carrier_]);
+      if (!split || !spend(split->bytes)) return tooLarge(number);
       if (split->place)
         curves[carrier_][0] = Curve(&*split->place, ChannelPath::translation, {}, {});
       if (split->turn) curves[carrier_][1] = Curve(&*split->turn, ChannelPath::rotation, {}, {});
@@ -499,6 +511,7 @@ class Packer {
       report.worstError = worst;
       report.worst = where(number, moved_[worstNode].source) + ", at " + decimal(worstTime) + " s";
     }
+    if (split) memoryLeft_ += split->bytes;
     return packed;
   }
 

@@ -38,12 +38,14 @@ Value interpolatedPlace(const Value& from, const Value& to, double fraction) {
 }
 
 struct KeysOut {
+  std::uint64_t& left;  ///< how many more there may be
   std::vector<float> times;
   std::vector<Value> values;
   double error = 0;  ///< the largest found of straight lines between keys
 
   void add(float time, const Value& value) {
-    if (!times.empty() && times.back() == time && values.back() == value) return;
+    if (left == 0 || (!times.empty() && times.back() == time && values.back() == value)) return;
+    --left;
     times.push_back(time);
     values.push_back(value);
   }
@@ -93,12 +95,13 @@ class Splitter {
   Value start_{};
 };
 
-/// Adds the keys after `from` up to `to`, so many that straight lines between them are near enough.
-/// `at` gets a time between both.
+/// Adds the keys after `from` up to `to`, so many that straight lines between them are near enough:
+/// by `error`, or by what float32 cannot keep by far. `at` gets a time between both.
 template <typename At, typename Between>
 void addKeysBetween(float from, const Value& start, float to, const Value& end, bool isRotation,
                     double error, const At& at, const Between& between, KeysOut& out,
                     int depth = 0) {
+  if (out.left == 0) return;
   const double gap = double{to} - double{from};
   const auto middle = static_cast<float>(double{from} + gap / 2);
   double worst = 0;
@@ -106,8 +109,10 @@ void addKeysBetween(float from, const Value& start, float to, const Value& end, 
     worst = std::max(worst, distance(between(start, end, fraction),
                                      at(double{from} + fraction * gap), isRotation));
   }
+  const double size = isRotation ? 1 : std::sqrt(std::max(dot(start, start), dot(end, end)));
   constexpr int deepest = 8;
-  if (worst <= error || depth == deepest || !(middle > from && middle < to)) {
+  if (worst <= std::max(error, 0x1p-30 * size) || depth == deepest ||
+      !(middle > from && middle < to)) {
     out.error = std::max(out.error, worst);
     out.add(to, end);
     return;
@@ -239,17 +244,22 @@ std::optional<MotionFrame> MotionFrame::of(const Transform& above, std::uint32_t
   return MotionFrame{above, upAxis, normalized({row[0], row[1], row[2], 0})};
 }
 
-SplitMotion splitMotion(const MotionFrame& frame, const ChannelView* translation,
-                        const ChannelView* rotation, const Value& restTranslation,
-                        const Value& restRotation, double duration, double length,
-                        double motionError, double turnError) {
+std::optional<SplitMotion> splitMotion(const MotionFrame& frame, const ChannelView* translation,
+                                       const ChannelView* rotation, const Value& restTranslation,
+                                       const Value& restRotation, double duration, double length,
+                                       double motionError, double turnError,
+                                       std::uint64_t mostBytes) {
   SplitMotion split;
   const Curve place(translation, ChannelPath::translation, restTranslation, {});
   const Curve turn(rotation, ChannelPath::rotation, restRotation, {});
   const Splitter splitter(frame, place, turn, length);
   const std::vector<float> times = splitTimes(translation, rotation, duration);
 
-  KeysOut motions, turns;
+  constexpr std::uint64_t keyBytes = 64;  // about: in double precision, and in float32
+  const std::uint64_t keyLimit = mostBytes / keyBytes;
+  std::uint64_t keysLeft = keyLimit;
+  KeysOut motions{keysLeft, {}, {}}, turns{keysLeft, {}, {}};
+  if (keysLeft < 2) return std::nullopt;
   motions.add(0, splitter.motionAt(0, Side::after, 0));
   turns.add(0, splitter.turnAt(0, Side::after));
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
@@ -268,7 +278,9 @@ SplitMotion splitMotion(const MotionFrame& frame, const ChannelView* translation
     near = end[2] / length;
     motions.add(times[i + 1], splitter.motionAt(to, Side::after, near));
     turns.add(times[i + 1], splitter.turnAt(to, Side::after));
+    if (keysLeft == 0) return std::nullopt;
   }
+  split.bytes = (keyLimit - keysLeft) * keyBytes;
   split.motion = channelWith(motions, ChannelPath::translation, split.keys);
   split.motionError = 2 * motions.error;
   split.turnError = 2 * turns.error;

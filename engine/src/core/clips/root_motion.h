@@ -48,14 +48,17 @@ struct SplitMotion {
   std::optional<ChannelView> turn;   ///< what remains of the rotation, if it has a channel
   /// How far the motion and what remains of the rotation are off, about: twice what was measured.
   double motionError = 0, turnError = 0;
+  std::uint64_t bytes = 0;  ///< of `keys`, and of what they were made of
   std::deque<std::vector<float>> keys;
 };
 
 /// Splits the translation and the rotation of a node. Straight lines between keys of the results
 /// are off by `motionError` and `turnError`, if that needs not too many keys. `place` is exact.
-SplitMotion splitMotion(const MotionFrame& frame, const ChannelView* translation,
-                        const ChannelView* rotation, const Value& restTranslation,
-                        const Value& restRotation, double duration, double length,
-                        double motionError, double turnError);
+/// Empty if the result takes more than `mostBytes`.
+std::optional<SplitMotion> splitMotion(const MotionFrame& frame, const ChannelView* translation,
+                                       const ChannelView* rotation, const Value& restTranslation,
+                                       const Value& restRotation, double duration, double length,
+                                       double motionError, double turnError,
+                                       std::uint64_t mostBytes);
 
 }  // namespace dermis
