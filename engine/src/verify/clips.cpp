@@ -22,7 +22,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include "clips/bank.h"
+#include "core/clips/errors.h"
 #include "dermis/clips.h"
 #include "dermis/verify.h"
 #include "strict_floating_point.h"
@@ -598,18 +598,6 @@ Result<std::vector<Layer>> toLayers(const Skeleton& skeleton, std::span<const Cl
     resolved.push_back(*layer);
   }
   return resolved;
-}
-
-/// Of each node of the skeleton.
-std::vector<ClipError> errorsOf(const PackedClips& bank, std::size_t nodeCount) {
-  std::vector<ClipError> errors(nodeCount);
-  const ClipBank read(bank);
-  for (std::size_t i = 0; i < read.header.nodeCount; ++i) {
-    const BankNode node = read.node(i);
-    if (node.source < nodeCount)
-      errors[node.source] = {node.translationError, node.rotationError, node.scaleError, 0};
-  }
-  return errors;
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "clips/errors.h"
 #include "dermis/clips.h"
 #include "pack/check.h"
 #include "strict_floating_point.h"
@@ -240,6 +241,17 @@ ClipError PackedClips::rootMotionError() const {
   if (bank.header.motion == 0) return {};
   const auto motion = bank.at<BankMotion>(bank.header.motion);
   return {motion.translationError, motion.rotationError};
+}
+
+std::vector<ClipError> errorsOf(const PackedClips& clips, std::size_t nodeCount) {
+  const ClipBank bank(clips);
+  std::vector<ClipError> errors(nodeCount);
+  for (std::size_t i = 0; i < bank.header.nodeCount; ++i) {
+    const BankNode node = bank.node(i);
+    if (node.source < nodeCount)
+      errors[node.source] = {node.translationError, node.rotationError, node.scaleError, 0};
+  }
+  return errors;
 }
 
 ClipError PackedClips::error(std::uint32_t node) const {
