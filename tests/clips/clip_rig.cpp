@@ -311,7 +311,7 @@ void forEachMorphedModel(std::uint32_t maxClips,
 }
 
 std::uint64_t peakKilobytes() {
-#ifdef __linux__
+#if defined(__linux__) && !defined(__SANITIZE_THREAD__)
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<std::uint64_t>(usage.ru_maxrss);

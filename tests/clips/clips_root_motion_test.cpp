@@ -353,13 +353,13 @@ TEST(ClipsRootMotion, RefusesWhatCannotWork) {
 }
 
 // What rounding makes of a path of this size is much more than its error may be. It must not be
-// split as long as that takes: half a minute, and 400 MB.
+// split as long as that takes, into 200 MB of keys.
 TEST(ClipsRootMotion, TooFarForItsError) {
   PackedRig rig(walker());
   rig.options.rootMotion = {.node = 1, .upAxis = 1};
   std::mt19937 random(1);
   Floats times, values;
-  for (int key = 0; key < 4000; ++key) {
+  for (int key = 0; key < 2000; ++key) {
     times.push_back(static_cast<float>(key) * 0.7f);
     for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(between(random, -1e15, 1e15)));
   }
@@ -367,7 +367,7 @@ TEST(ClipsRootMotion, TooFarForItsError) {
   rig.clips[0].channels = {{1, ChannelPath::translation, Interpolation::linear, times, values}};
   const std::uint64_t before = peakKilobytes();
   const Result<PackedClips> packed = rig.tryToPack();
-  EXPECT_LT(peakKilobytes() - before, 60'000u);
+  EXPECT_LT(peakKilobytes() - before, 150'000u);
   ASSERT_FALSE(packed.ok());
   EXPECT_EQ(packed.error().code, ErrorCode::limitExceeded);
   EXPECT_NE(packed.error().message.find("'far'"), std::string::npos) << packed.error().message;
