@@ -369,9 +369,6 @@ Result<Layer> toLayer(const ClipLayer& from, std::span<const ClipView> clips,
 // lerp(1, difference, w) is such a sum in which the first part is exact. If errors decide about the
 // hemisphere, the rotation may be any.
 //
-// Denormals: a kernel may take a factor of less than 2^-126 for 0. So each share of the sum is off
-// by that, divided by the sum.
-//
 // float32: a weighted mean has at most 11 roundings of each part. 16 u of its parts cover them,
 // also for quaternions, at 2 × 5 roundings. A product of two quaternions and the interpolation
 // before it turn by at most 32 u. So do the conversion of a quaternion to a matrix, whose 9 entries
@@ -383,11 +380,6 @@ struct LocalError {
 
 double largestOf(const dvec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-}
-
-/// How far the shares of at most four factors are off together because denormals are flushed.
-double flushedShares(double total) {
-  return total > 64 * denormal ? 16 * denormal * (1 + 1 / total) : noBound;
 }
 
 /// The numbers of `local` may overflow: then no error is too large.
@@ -408,7 +400,7 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
   const double angle = double{clipError.rotation} + 16 * u;
   Local sum{dvec3(0.0), dquat(0, 0, 0, 0), dvec3(0.0)};
   dquat first(1, 0, 0, 0);
-  double total = 0, translations = 0, scales = 0, farthest = 0, largest = 0;
+  double total = 0, translations = 0, scales = 0;
   bool eitherHemisphere = false;
   for (const Layer& layer : layers) {
     const double factor = layer.factor(node);
@@ -418,15 +410,13 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
                                   : localAt(skeleton, node, layer.clip, layer.time);
     if (total == 0) first = local.rotation;
     const double cosine = glm::dot(first, local.rotation);
-    eitherHemisphere |= std::abs(cosine) <= angle || factor < 2 * denormal;
+    eitherHemisphere |= std::abs(cosine) <= angle;
     total += factor;
     sum.translation += factor * local.translation;
     sum.rotation = sum.rotation + local.rotation * (cosine < 0 ? -factor : factor);
     sum.scale += factor * local.scale;
     translations += factor * glm::length(local.translation);
     scales += factor * largestOf(local.scale);
-    farthest = std::max(farthest, glm::length(local.translation));
-    largest = std::max(largest, largestOf(local.scale));
   }
   if (total == 0) {
     const Local rest = restOf(skeleton.nodes[node]);
@@ -435,12 +425,9 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
     checkRange(rest, error);
     return rest;
   }
-  const double shares = flushedShares(total);
-  error.translation = double{clipError.translation} + 16 * u * translations / total +
-                      flushedVector + shares * farthest;
-  error.rotation = turnOf(total * (angle + 2 * shares), sum.rotation, eitherHemisphere) + 32 * u;
-  error.scale =
-      double{clipError.scale} + 16 * u * scales / total + flushedVector + shares * largest;
+  error.translation = double{clipError.translation} + 16 * u * translations / total + flushedVector;
+  error.rotation = turnOf(total * angle, sum.rotation, eitherHemisphere) + 32 * u;
+  error.scale = double{clipError.scale} + 16 * u * scales / total + flushedVector;
   const Local mean{sum.translation / total, glm::normalize(sum.rotation), sum.scale / total};
   checkRange(mean, error);
   return mean;
@@ -709,19 +696,16 @@ Result<SampledWeights> sampleWeights(const Skeleton& skeleton, std::span<const C
       return weightAt(skeleton, node, number, clip, time);
     };
     const double rest = double{skeleton.nodes[node].weights[number]};
-    double total = 0, sum = 0, sizes = 0, largest = 0;
+    double total = 0, sum = 0, sizes = 0;
     for (const Layer& layer : *resolved) {
       if (layer.clip->additive) continue;
       const double factor = layer.factor(node), value = at(layer.clip, layer.time);
       total += factor;
       sum += factor * value;
       sizes += factor * std::abs(value);
-      if (factor > 0) largest = std::max(largest, std::abs(value));
     }
     double weight = total > 0 ? sum / total : rest, bound = denormal;
-    if (total > 0) {
-      bound = clipError + 16 * u * sizes / total + flushedVector + flushedShares(total) * largest;
-    }
+    if (total > 0) bound = clipError + 16 * u * sizes / total + flushedVector;
     for (const Layer& layer : *resolved) {
       if (!layer.clip->additive) continue;
       const double base = layer.base ? at(*layer.base, layer.baseTime) : rest;
