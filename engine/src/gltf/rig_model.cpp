@@ -254,8 +254,7 @@ class RigApplier {
       ofJoints.erase(found);
     }
     std::ranges::sort(moved);
-    const auto repeated = std::ranges::unique(moved);
-    moved.erase(repeated.begin(), repeated.end());
+    moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
     if (moved.empty()) return false;
     const auto count = static_cast<std::uint32_t>(moved.size());
     const auto slots = static_cast<std::uint32_t>(most);

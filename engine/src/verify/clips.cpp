@@ -60,8 +60,8 @@ class Clip {
 
   const ClipView* operator->() const { return view_; }
   std::span<const ChannelView* const> channelsOf(std::uint32_t node) const {
-    const auto found = std::ranges::equal_range(channels_, node, {}, &ChannelView::node);
-    return {found.begin(), found.end()};
+    return {std::ranges::lower_bound(channels_, node, {}, &ChannelView::node),
+            std::ranges::upper_bound(channels_, node, {}, &ChannelView::node)};
   }
 
  private:
