@@ -321,7 +321,8 @@ std::uint64_t peakKilobytes() {
 }
 
 bool areSame(std::span<const JointMatrix> a, std::span<const JointMatrix> b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
 }
 
 }  // namespace dermis::test
