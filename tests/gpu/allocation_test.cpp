@@ -262,8 +262,8 @@ TEST(CpuAllocationTest, WarmJobsAllocateNothing) {
   }
 }
 
-/// Runs a job in a thread of its own, which has no working memory yet. Returns whether there was
-/// enough memory.
+/// Runs a job in a new thread, so that it has to allocate its working memory. Returns false if the
+/// memory was not enough.
 bool runInNewThread(const cpu::PlannedJob& job, std::uint32_t allocationsAllowed) {
   std::packaged_task<bool()> run([&] {
     allowed = allocationsAllowed;
