@@ -218,6 +218,10 @@ std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan:
 /// Throws `Failure`.
 std::vector<DrivenPose> drivenPoses(Device& device, const vulkan::Context& context,
                                     const PackedRig& rig, std::span<const RigInput> inputs) {
+  const std::size_t ofJoints = rig.drivenJoints() * sizeof(JointMatrix);
+  // There is no buffer without bytes.
+  if (ofJoints == 0 && rig.givenWeights() + rig.drivenWeights() == 0)
+    return std::vector<DrivenPose>(inputs.size());
   vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
   Scene& scene = recorder.scene();
   // A rig is evaluated when an instance is skinned with its pose.
@@ -234,7 +238,6 @@ std::vector<DrivenPose> drivenPoses(Device& device, const vulkan::Context& conte
     must(scene.addInstance(point));
     ranges.push_back(must(recorder.drivenRange(point.pose)));
   }
-  const std::size_t ofJoints = rig.drivenJoints() * sizeof(JointMatrix);
   std::vector<DrivenPose> poses;
   for (const std::vector<std::byte>& bytes : runFrame(device, context, recorder, ranges)) {
     const std::span<const std::byte> all(bytes);

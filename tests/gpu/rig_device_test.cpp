@@ -158,6 +158,30 @@ TEST_F(RigOnDevice, DrivesWhatTheReferenceDoesWithinItsBounds) {
   RecordProperty("worst share of a bound", std::to_string(worst));
 }
 
+TEST_F(RigOnDevice, ARigMayDriveNothing) {
+  const std::vector<RigJoint> joints(allJoints);
+  RigView view;
+  view.joints = joints;
+  view.writtenJoints = allJoints;
+  const PackedRig rig = must(packRig(view));
+  const Pose written = systemPose(1, allJoints);
+  samples::VulkanTarget target(*open_->device, open_->context);
+  const std::vector<samples::RigInput> inputs(2, {written, {}});
+  const std::vector<Driven> driven = must(target.drivePoses(rig, inputs));
+  ASSERT_EQ(driven.size(), inputs.size());
+  EXPECT_TRUE(driven[1].joints.empty() && driven[1].weights.empty());
+  // In a scene, too.
+  const RigHandle handle = must(scene().addRig(PackedRig(rig)));
+  InstanceDescription instance{.mesh = mesh_, .layout = plainLayout()};
+  instance.pose = must(scene().addPose(allJoints, {.rig = handle}));
+  write(instance.pose, written, {});
+  const InstanceHandle rigged = engine().addInstance(instance);
+  instance.pose = engine().addPose(written);
+  const InstanceHandle plain = engine().addInstance(instance);
+  runFrame();
+  EXPECT_EQ(engine().read(rigged), engine().read(plain));
+}
+
 TEST_F(RigOnDevice, DrivenJointsAndWeightsAreSkinnedAsOthers) {
   const RigHandle rig = must(scene().addRig(riggedPose(2)));
   for (const Method method : {Method::linear, Method::dualQuaternion, Method::blended}) {
