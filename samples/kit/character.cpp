@@ -101,10 +101,15 @@ Skeleton Character::skeleton() const {
   return skeleton;
 }
 
-std::optional<ClipLayer> Character::layer(PoseKey key) const {
-  if (model_->clips.empty()) return std::nullopt;
-  const double duration = model_->clips[key.clip].duration;
-  return ClipLayer{.clip = key.clip, .time = duration * key.tick / tickCount(key.clip)};
+void Character::addLayers(const Playing& playing, std::vector<ClipLayer>& layers) const {
+  if (model_->clips.empty()) return;
+  const auto add = [&](PoseKey key, float weight) {
+    const double duration = model_->clips[key.clip].duration;
+    layers.push_back(
+        {.clip = key.clip, .time = duration * key.tick / tickCount(key.clip), .weight = weight});
+  };
+  add(playing.pose, playing.weight);
+  if (playing.fades()) add(playing.before, 1 - playing.weight);
 }
 
 std::uint64_t Character::vertexCount() const {

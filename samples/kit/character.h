@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,6 +29,17 @@ struct PoseKey {
   std::uint32_t tick = 0;
 
   friend auto operator<=>(const PoseKey&, const PoseKey&) = default;
+};
+
+/// What a figure plays: a moment of a clip, which may fade in over what it played before.
+struct Playing {
+  PoseKey pose;
+  PoseKey before;
+  float weight = 1;  ///< of `pose`; `before` has the rest
+
+  bool fades() const { return weight < 1; }
+
+  friend auto operator<=>(const Playing&, const Playing&) = default;
 };
 
 struct CharacterOptions {
@@ -58,8 +68,8 @@ class Character {
 
   /// Its skeleton, with the skins of `jointCounts`.
   Skeleton skeleton() const;
-  /// What a figure plays at a moment; nothing if the file has no clips.
-  std::optional<ClipLayer> layer(PoseKey key) const;
+  /// Appends the layers of what a figure plays: up to two, and none if the file has no clips.
+  void addLayers(const Playing& playing, std::vector<ClipLayer>& layers) const;
 
  private:
   /// A clip, sampled once. Figures at the same tick of a clip have the same pose.

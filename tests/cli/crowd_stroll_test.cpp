@@ -77,7 +77,7 @@ TEST_F(StrollTest, FiguresGoWhereTheirFeetTakeThem) {
   const Stroll stroll(*character_, *gait_, {});
   std::uint32_t walking = 0;
   for (std::uint32_t figure = 0; figure < stroll.count(); ++figure) {
-    const ClipGait& gait = gait_->clips[stroll.at(figure, 1).pose.clip];
+    const ClipGait& gait = gait_->clips[stroll.at(figure, 1).playing.pose.clip];
     const dermis::JointMatrix now = stroll.at(figure, 1).place, next = stroll.at(figure, 2).place;
     const auto& m = now.m;
     const double x = m[0][0] * gait.stepX + m[0][2] * gait.stepZ;
@@ -148,11 +148,7 @@ class Jerks {
 
   void add(const FigureState& now) {
     std::vector<dermis::ClipLayer> layers;
-    const auto addLayer = [&](const dermis::samples::PoseKey& pose, float weight) {
-      if (weight > 0) layers.emplace_back(*character_->layer(pose)).weight = weight;
-    };
-    addLayer(now.pose, 1 - now.beforeWeight);
-    addLayer(now.before, now.beforeWeight);
+    character_->addLayers(now.playing, layers);
     std::vector<glm::dvec3> points;
     for (const dermis::samples::Part& part : character_->parts()) {
       std::vector<dermis::JointMatrix> pose(bank_->jointCount(part.skin));
@@ -162,8 +158,8 @@ class Jerks {
       for (const auto& position : skinned.positions)
         points.emplace_back(position[0], position[1], position[2]);
     }
-    const bool begins = !frames_.empty() && now.pose.tick < last_.pose.tick;
-    const bool fades = now.beforeWeight > 0 || last_.beforeWeight > 0;
+    const bool begins = !frames_.empty() && now.playing.pose.tick < last_.playing.pose.tick;
+    const bool fades = now.playing.fades() || last_.playing.fades();
     loops += begins ? 1 : 0;
     fadedFrames += fades ? 1 : 0;
     // A second difference has to do with three frames.

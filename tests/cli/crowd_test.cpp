@@ -26,7 +26,8 @@ CommandResult crowd(Arguments arguments, const std::vector<std::string>& environ
   return runCommand(arguments, environment);
 }
 
-/// The report of 12 figures in 40 frames, each compared. Figures come, go, jump and leave the view.
+/// The report of 12 figures in 40 frames, each compared. Figures come, go, fade to other clips,
+/// jump and leave the view.
 nlohmann::json reportOf(const Arguments& added, const std::vector<std::string>& environment = {}) {
   const std::string json = outFile("crowd.json");
   Arguments arguments{"--figures", "12", "--frames", "40", "--check-every", "1", "--json", json};
@@ -42,9 +43,12 @@ nlohmann::json reportOf(const Arguments& added, const std::vector<std::string>& 
   EXPECT_EQ(check["frames"], 40);
   EXPECT_GT(check["instances"], 100);
   EXPECT_EQ(check["failures"], 0);
+  EXPECT_GT(check["poses"], 50);
+  EXPECT_LT(check["worstPose"], 1);
   EXPECT_EQ(report["frames"], 40);
   EXPECT_EQ(report["rows"].size(), 2u) << "every 20th frame";
   EXPECT_GT(totals["skinned"], 0);
+  EXPECT_GT(totals["fading"], 20);
   EXPECT_GT(totals["withinInterval"], 0);
   EXPECT_EQ(totals["instances"].get<int>(), totals["skinned"].get<int>() +
                                                 totals["outOfView"].get<int>() +

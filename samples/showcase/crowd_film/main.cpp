@@ -103,12 +103,7 @@ class SkinnedCrowd {
     layers.reserve(2 * figures_.size());  // plays point to them
     for (const Figure& figure : figures_) {
       const std::size_t first = layers.size();
-      const auto add = [&](const samples::PoseKey& pose, float weight) {
-        const auto layer = character_->layer(pose);
-        if (layer && weight > 0) layers.emplace_back(*layer).weight = weight;
-      };
-      add(figure.now.pose, 1 - figure.now.beforeWeight);
-      add(figure.now.before, figure.now.beforeWeight);
+      character_->addLayers(figure.now.playing, layers);
       plays.push_back({figure.handle, std::span(layers).subspan(first)});
     }
     must(recorder_.scene().play(plays));

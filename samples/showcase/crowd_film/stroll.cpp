@@ -155,7 +155,7 @@ void Stroll::pose(std::uint32_t figure, std::uint64_t frame, FigureState& state)
     return {clip,
             static_cast<std::uint32_t>((clock(frame) + role.phase) % character_->tickCount(clip))};
   };
-  state.pose = keyOf(role.clip);
+  state.playing.pose = keyOf(role.clip);
   if (role.step != 0 || standingClips_.size() < 2) return;
   const double time = static_cast<double>(clock(frame)) / framesPerSecond_ / changeSeconds +
                       chance(figure, changeTime);
@@ -163,12 +163,12 @@ void Stroll::pose(std::uint32_t figure, std::uint64_t frame, FigureState& state)
   const auto clipIn = [&](std::uint32_t number) {
     return number == 0 ? role.clip : choose(standingClips_, figure + number * count());
   };
-  state.pose = keyOf(clipIn(turn));
+  state.playing.pose = keyOf(clipIn(turn));
   if (turn == 0) return;
-  state.before = keyOf(clipIn(turn - 1));
+  state.playing.before = keyOf(clipIn(turn - 1));
   const double t = std::min((time - turn) * changeSeconds / fadeSeconds, 1.0);
-  if (state.before.clip != state.pose.clip)
-    state.beforeWeight = static_cast<float>(1 - t * t * (3 - 2 * t));
+  if (state.playing.before.clip != state.playing.pose.clip)
+    state.playing.weight = static_cast<float>(t * t * (3 - 2 * t));
 }
 
 FigureState Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
@@ -180,11 +180,8 @@ FigureState Stroll::at(std::uint32_t figure, std::uint64_t frame) const {
   FigureState state;
   pose(figure, frame, state);
   const auto groundOf = [&](const samples::PoseKey& key) { return gait_->clips[key.clip].ground; };
-  const double before = double{state.beforeWeight};
-  state.place =
-      placeAt(role, angle,
-              before == 0 ? groundOf(state.pose)
-                          : (1 - before) * groundOf(state.pose) + before * groundOf(state.before));
+  const auto& [now, before, weight] = state.playing;
+  state.place = placeAt(role, angle, std::lerp(groundOf(before), groundOf(now), double{weight}));
   state.isInView = flight_.sees(seenFrom, middle, reach * unit_);
   state.distance = glm::distance(middle, seenFrom.place);
   // Approximate distance that a hand or foot moves in a frame.

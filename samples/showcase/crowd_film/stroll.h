@@ -21,11 +21,7 @@ struct StrollOptions {
 
 /// The state of a figure in one frame.
 struct FigureState {
-  dermis::samples::PoseKey pose;
-  /// While it changes to another clip: what it did before, and how much of that is left, from 0
-  /// to 1.
-  dermis::samples::PoseKey before;
-  float beforeWeight = 0;
+  dermis::samples::Playing playing;
   bool isInView = false;
   std::uint32_t updateInterval = 1;  ///< by the distance from the camera
   double distance = 0;
