@@ -62,7 +62,7 @@ if(DERMIS_SANITIZE STREQUAL "address")
   target_link_options(dermis_build_flags INTERFACE -fsanitize=address,undefined)
   if(NOT DERMIS_SANITIZE_TESTS)
     # These checks at each access cost up to a third of the compile time, and the address sanitizer finds nearly all that they find.
-    target_compile_options(dermis_build_flags INTERFACE -fno-sanitize=null,object-size)
+    target_compile_options(dermis_build_flags INTERFACE -fno-sanitize=null,object-size,pointer-overflow)
   endif()
 elseif(DERMIS_SANITIZE STREQUAL "thread")
   target_compile_options(dermis_build_flags INTERFACE -fsanitize=thread -fno-omit-frame-pointer)

@@ -3,7 +3,8 @@
 #
 #   tests/run.sh                   what CI runs: `ci`, then `sanitized`. What both could run, `sanitized` runs
 #   tests/run.sh PRESET            ci, dev, release, asan or tsan: builds it, runs all tests of every change
-#   tests/run.sh sanitized         what needs no device, with address and undefined-behavior sanitizers; fewer cases of what takes long
+#   tests/run.sh sanitized         what needs no device and handles data from outside, with address and undefined-behavior sanitizers;
+#                                  fewer cases of what takes long
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, or else in ../shared, and are
@@ -80,7 +81,7 @@ sanitized() {
   [ -f build/ci/CMakeCache.txt ] || cmake --preset ci >build/ci.log
   cmake --build build/ci --target dermis_kernels
   build_and_test build/sanitized "-L sanitized" asan -DDERMIS_SANITIZE_TESTS=OFF -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=ON \
-    -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels" -DDERMIS_QUICK_OPTIMIZATION=-O0
+    -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_RUNTIME_COMPILER=OFF -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels" -DDERMIS_QUICK_OPTIMIZATION=-O0
 }
 
 step "install" ./cmake/install-deps.sh
