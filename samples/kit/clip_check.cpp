@@ -87,8 +87,10 @@ Comparison comparePose(std::span<const JointMatrix> pose, const reference::Sampl
   Comparison comparison;
   for (std::size_t joint = 0; joint < pose.size(); ++joint) {
     const auto [atJoint, perDistance] = expected.bounds[joint];
-    if (!std::isfinite(atJoint + perDistance)) {  // its inverse bind matrix is singular
-      if (isFinite(pose[joint])) {
+    if (!std::isfinite(perDistance)) {
+      if (!std::isfinite(atJoint)) {
+        ++comparison.exempt.outOfRange;
+      } else if (isFinite(pose[joint])) {
         ++comparison.exempt.onlyFinite;
       } else {
         compare(comparison, joint, HUGE_VAL, 1);

@@ -324,8 +324,13 @@ TEST(VerificationTest, PosesAndWeightsAwayFromTheClipsAreFound) {
   pose[1].m[2][1] = NAN;
   EXPECT_GT(compare().failures, 0u);
   // Without an inverse: only finite.
-  expected.bounds[1] = {HUGE_VAL, HUGE_VAL};
+  expected.bounds[1] = {1e30, HUGE_VAL};
   EXPECT_EQ(compare().failures, 1u);
+  // Out of range: anything.
+  expected.bounds[1] = {HUGE_VAL, HUGE_VAL};
+  EXPECT_TRUE(compare().passed());
+  EXPECT_EQ(compare().exempt.outOfRange, 1u);
+  expected.bounds[1] = {1e30, HUGE_VAL};
   pose[1].m[2][1] = 5;
   EXPECT_TRUE(compare().passed());
   EXPECT_EQ(compare().exempt.onlyFinite, 1u);

@@ -282,6 +282,20 @@ TEST(ClipsRange, NoBoundHoldsBeyondTheRange) {
   for (const double bound : bounds[0]) EXPECT_TRUE(std::isinf(bound));
 }
 
+// Inside the range it must be finite, although there is no frame of the joint.
+TEST(ClipsRange, AJointWithASingularInverseBindMatrixIsFinite) {
+  PackedRig rig(originRig());
+  std::vector<JointMatrix> inverseBind(rig.skeleton.skins[0].inverseBind.begin(),
+                                       rig.skeleton.skins[0].inverseBind.end());
+  inverseBind[1].m[2][2] = 0;
+  rig.skeleton.skins[0].inverseBind = inverseBind;
+  ASSERT_TRUE(rig.pack());
+  const std::vector<std::array<double, 2>> bounds = boundsOf(rig, {.time = 0.3});
+  for (const double bound : bounds[0]) EXPECT_TRUE(std::isfinite(bound));
+  EXPECT_TRUE(std::isfinite(bounds[1][0]));
+  EXPECT_TRUE(std::isinf(bounds[1][1]));
+}
+
 TEST(ClipTime, WrapsInDoublePrecision) {
   const ClipInfo wrapping{.duration = 0.75f, .wraps = true};
   const ClipInfo clamping{.duration = 0.75f, .wraps = false};

@@ -82,7 +82,8 @@ struct SampledPose {
   /// How near a pose of the bank must be: {A, B} for each joint, or empty if there was no bank. Its
   /// joint matrix moves a point p of bind space to at most A + B d from where `joints` moves it. d
   /// is the length of inverse bind matrix × p: how far p is from the joint, in the joint's frame.
-  /// Infinite if the inverse bind matrix is singular, or numbers leave the range of float32.
+  /// B is infinite if the inverse bind matrix is singular: the joint matrix must only be finite.
+  /// Both are if numbers leave the range of float32: then it may be anything.
   std::vector<std::array<double, 2>> bounds;
 };
 

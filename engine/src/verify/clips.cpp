@@ -547,7 +547,8 @@ std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
   const dvec3 t(inverseBind[3]);
   const PosedNode& last = nodes[joint];
   const double size = last.product * (values[0] + glm::length(t)) + last.span;
-  if (values[2] == 0 || last.mayOverflow || !(size <= mostSize)) return {noBound, noBound};
+  if (last.mayOverflow || !(size <= mostSize)) return {noBound, noBound};
+  if (values[2] == 0) return {mostSize, noBound};
   const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
   const double flushedJoint = flushedMatrix * std::max(last.above, last.stretch);
   double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span) +
