@@ -324,7 +324,7 @@ class Mistakes {
         {{"w first, read as last", {3, 0, 1, 2}}, {"w last, read as first", {1, 2, 3, 0}}}};
     for (const auto& [form, order] : orders) {
       local(PoseMistake::quaternionOrder, form,
-            each(part_.locals, [&](const dmat4& m) { return withOrder(m, order); }));
+            each(part_.locals, [chosen = order](const dmat4& m) { return withOrder(m, chosen); }));
     }
   }
 
