@@ -1,13 +1,16 @@
 // What clips cost in a SceneRecorder: figures of a model, each with a pair of clips and a phase of
 // its own, all blended and sampled in each frame, beside the cost of skinning 3,000 vertices with
-// poses that the CPU writes. Process CPU time of the best of several frames, and the CPU's share:
-// `play`, plan and record.
+// rigid poses that the CPU writes. Poses of clips may scale, which makes them dearer to convert to
+// palettes. So what sampling and composing take is the difference to figures whose poses the CPU
+// writes, but which are of these clips. Process CPU time of the best of several frames, and the
+// CPU's share: `play`, plan and record.
 //
 //   dermis_clips_benchmark MODEL [FIGURES [FRAMES [MAX-ERROR]]]
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
@@ -15,6 +18,7 @@
 #include <cstring>
 #include <ctime>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "dermis/clips.h"
@@ -34,14 +38,24 @@ double processSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Figures with an instance each.
+/// What a figure plays.
+std::array<ClipLayer, 2> layersOf(const PackedClips& bank, std::uint32_t figure,
+                                  std::uint32_t frame) {
+  const std::uint32_t clips = bank.clipCount();
+  const double time = 0.37 * figure + frame / 60.0;
+  return {
+      {{figure % clips, time, 0.7f}, {(figure / clips + 1 + figure) % clips, 1.3 * time, 0.3f}}};
+}
+
+/// Figures with an instance each. They play clips, or have a pose that is written in each frame.
 class Figures {
  public:
   Figures(samples::OpenDevice& open, const PackedClips& bank, std::uint32_t count,
-          std::uint32_t vertexCount, bool areSampled)
-      : bank_(bank), engine_(*open.device, open.context, description(open, count, vertexCount)) {
+          std::uint32_t vertexCount, std::vector<std::vector<JointMatrix>> written)
+      : bank_(bank),
+        engine_(*open.device, open.context, description(open, count, vertexCount)),
+        written_(std::move(written)) {
     const std::uint32_t joints = bank.jointCount(0);
-    pose_ = samples::randomPose(1, joints, samples::Rigidity::rigid);
     engine_.begin();
     InstanceDescription instance;
     instance.layout.normals = VertexFormat::float32x3;
@@ -49,12 +63,12 @@ class Figures {
         engine_.addMesh(must(pack(samples::randomMesh(1, vertexCount, joints, 4).view(), joints)));
     const ClipsHandle clips = must(engine_->addClips(PackedClips(bank)));
     for (std::uint32_t i = 0; i < count; ++i) {
-      if (areSampled) {
+      if (written_.empty()) {
         figures_.push_back(must(engine_->addFigure(clips)));
         instance.pose = must(engine_->pose(figures_.back()));
       } else {
         instance.pose =
-            poses_.emplace_back(engine_.addPose(pose_, {.promise = JointPromise::scaling}));
+            poses_.emplace_back(engine_.addPose(written_[0], {.promise = JointPromise::scaling}));
       }
       if (i == 0) must(engine_.recorder().prepare(instance));
       must(engine_->addInstance(instance));
@@ -71,7 +85,8 @@ class Figures {
       engine_.begin();
       engine_.finish();
       const double begin = processSeconds();
-      for (const PoseHandle pose : poses_) engine_.writePose(pose, pose_);
+      for (std::size_t i = 0; i < poses_.size(); ++i)
+        engine_.writePose(poses_[i], written_[i % written_.size()]);
       const auto beforePlay = std::chrono::steady_clock::now();
       play(frame);
       const std::chrono::duration<double> played = std::chrono::steady_clock::now() - beforePlay;
@@ -99,11 +114,8 @@ class Figures {
     layers_.clear();
     plays_.clear();
     layers_.reserve(2 * figures_.size());
-    const std::uint32_t clips = bank_.clipCount();
     for (std::uint32_t i = 0; i < figures_.size(); ++i) {
-      const double time = 0.37 * i + frame / 60.0;
-      layers_.push_back({i % clips, time, 0.7f});
-      layers_.push_back({(i / clips + 1 + i) % clips, 1.3 * time, 0.3f});
+      for (const ClipLayer& layer : layersOf(bank_, i, frame)) layers_.push_back(layer);
       plays_.push_back({figures_[i], std::span(layers_).last(2)});
     }
     must(engine_->play(plays_));
@@ -111,7 +123,7 @@ class Figures {
 
   const PackedClips& bank_;
   test::SystemEngine engine_;
-  std::vector<JointMatrix> pose_;
+  std::vector<std::vector<JointMatrix>> written_;  ///< in turn; empty: they play clips
   std::vector<PoseHandle> poses_;
   std::vector<FigureHandle> figures_;
   std::vector<ClipLayer> layers_;
@@ -139,11 +151,17 @@ int run(int argc, char** argv) {
   fmt::print("{}; {} clips of {} joints in {} bytes; {} figures\n", open.device->info().name,
              bank.clipCount(), bank.jointCount(0), report.byteCount, count);
   constexpr std::uint32_t few = 3, many = 3000;
-  const auto cost = [&](std::uint32_t vertices, bool areSampled) {
-    return Figures(open, bank, count, vertices, areSampled).run(frames);
+  const auto cost = [&](std::uint32_t vertices, std::vector<std::vector<JointMatrix>> written) {
+    return Figures(open, bank, count, vertices, std::move(written)).run(frames);
   };
-  const Figures::Cost sampled = cost(few, true), written = cost(few, false),
-                      skinned = cost(many, false);
+  std::vector<std::vector<JointMatrix>> ofClips;
+  for (std::uint32_t i = 0; i < 10 * bank.clipCount(); ++i) {
+    const std::array<ClipLayer, 2> layers = layersOf(bank, i, 0);
+    must(samplePose(bank, layers, 0, ofClips.emplace_back(bank.jointCount(0))));
+  }
+  const Figures::Cost sampled = cost(few, {}), written = cost(few, ofClips),
+                      skinned = cost(many, {samples::randomPose(1, bank.jointCount(0),
+                                                                samples::Rigidity::rigid)});
   const double perFigure = 1e6 / count;
   fmt::print(
       "us a figure: sampled and converted {:.2f}, written and converted {:.2f}, with {} vertices "
