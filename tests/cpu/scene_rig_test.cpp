@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -128,6 +129,59 @@ TEST_F(CpuSceneRigTest, FiguresMayHaveRigs) {
     engine_.submit();
     for (const Pair& pair : pairs) expectAlike(pair);
   }
+}
+
+// What the figure played while nobody needed the rig.
+TEST_F(CpuSceneRigTest, ARigIsEvaluatedWhenItsSkinIsShownAgain) {
+  constexpr std::uint32_t given = 3;
+  const std::uint32_t node = weightedNode(given);
+  const PackedRig rig = riggedPose(6, given, node);
+  const ClipsHandle bank = must(engine_->addClips(PackedClips(playedClips())));
+  const FigureHandle figure = must(
+      engine_->addFigure(bank, std::array{RigHandle(), must(engine_->addRig(PackedRig(rig)))}));
+  const Pair pair = add(must(engine_->pose(figure, 1)), Method::dualQuaternion);
+  const std::uint32_t joints = playedClips().jointCount(0);
+  must(engine_->addInstance({.mesh = engine_.addMesh(systemMesh(2, 40, joints)),
+                             .pose = must(engine_->pose(figure, 0)),
+                             .layout = plainLayout()}));
+  const auto run = [&](bool isVisible, std::optional<std::uint32_t> play) {
+    engine_.begin();
+    must(engine_->change(InstanceChange{.instance = pair.instance, .visible = isVisible}));
+    if (play) {
+      const FigurePlay played{figure, playedLayers(*play)};
+      must(engine_->play({&played, 1}));
+      std::array<float, given> weights;
+      must(sampleWeights(playedClips(), playedLayers(*play), node, weights));
+      writePlain(pair, rig, playedPose(*play, 1), weights, {});
+    }
+    engine_.submit();
+  };
+  run(true, 0);
+  expectAlike(pair);
+  run(false, 1);
+  run(true, {});
+  expectAlike(pair);
+}
+
+// Otherwise it could not go back to the figure.
+TEST_F(CpuSceneRigTest, AMeshWithOtherTargetsIsRefusedAwayFromTheFigure) {
+  const ClipsHandle bank = must(engine_->addClips(PackedClips(playedClips())));
+  const std::uint32_t joints = playedClips().jointCount(0);
+  const MeshHandle three = engine_.addMesh(systemMesh(2, 40, joints, 4, 3)),
+                   two = engine_.addMesh(systemMesh(2, 40, joints, 4, 2));
+  const InstanceHandle instance =
+      must(engine_->addInstance({.mesh = three,
+                                 .pose = must(engine_->pose(must(engine_->addFigure(bank)), 0)),
+                                 .layout = plainLayout(),
+                                 .morphWriter = MorphWriter::clips,
+                                 .weightsOf = weightedNode(3)}));
+  must(engine_->change(
+      InstanceChange{.instance = instance, .pose = must(engine_->addPose(joints))}));
+  const Result<void> changed = engine_->change(InstanceChange{.instance = instance, .mesh = two});
+  ASSERT_FALSE(changed.ok());
+  EXPECT_EQ(changed.error().message,
+            "the instance has 3 morph weights, which the CPU does not write, but its mesh has 2 "
+            "targets");
 }
 
 TEST_F(CpuSceneRigTest, AFigureNeedsThePipelinesOfAllItsRigs) {

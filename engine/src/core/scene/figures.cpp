@@ -281,6 +281,7 @@ void SceneBooks::sampleFigure(std::uint32_t index, bool isNeeded) {
   figure.plannedIn = planNumber_;
   figure.place = static_cast<std::uint32_t>(sampling_.size());
   sampling_.push_back(index);
+  if (owner_.isCpu) return;
   for (const PoseHandle pose : figure.poses) {
     if (poses_.at(pose.index).rig != notUsed) driveRig(pose.index, figure.place);
   }

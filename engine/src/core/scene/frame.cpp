@@ -63,9 +63,14 @@ void SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
   if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
   converted.plannedIn = planNumber_;
   const bool isNeeded = !isCulled || pose.figure == notUsed;
+  const bool isDriven = pose.rig != notUsed && pose.drivenVersion != pose.version;
   if (pose.figure != notUsed) {
+    // On the CPU a job evaluates only the rigs that it needs, of a figure that it samples.
+    SceneFigure& figure = figures_.at(pose.figure);
+    if (owner_.isCpu && isDriven) figure.sampled = 0;
     sampleFigure(pose.figure, isNeeded);
-  } else if (pose.rig != notUsed && pose.drivenVersion != pose.version) {
+    if (owner_.isCpu && isDriven) driveRig(instance.pose, figure.place);
+  } else if (isDriven) {
     driveRig(instance.pose, notUsed);
   }
   conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form), isNeeded});
@@ -179,7 +184,8 @@ void SceneBooks::gatherCulled() {
     if (!instance.isWritten || instance.shown != instance.target)
       historyCopy_.size = slotCapacity_ * sizeof(abi::HistoryRecord);
     std::uint32_t version = instance.version;
-    const bool isNew = version == 0 || actionOf(state, instance.pose, state.need) >= Action::skin;
+    const Action action = actionOf(state, instance.pose, state.need);
+    const bool isNew = version == 0 || action >= Action::skin;
     if (isNew) {
       nextVersion_ = std::max(nextVersion_ + 1, 1u);
       version = nextVersion_;
@@ -202,7 +208,7 @@ void SceneBooks::gatherCulled() {
       if (figure.plannedIn == planNumber_) candidate.figure = figure.place;
     }
     // One that the GPU has yet to show in this version comes back, and restarts for that.
-    const bool restarts = isNew && state.need == Need::restart;
+    const bool restarts = isNew && (state.need == Need::restart || action == Action::restart);
     const bool isHeld = !isNew && holds(index);
     if (isNew) {
       noteBox(index, restarts ? BoxChange::rests : BoxChange::moves);
@@ -592,6 +598,8 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
                    " cannot be read back: it is not one of the last " +
                    std::to_string(readBacks_.size()) + " frames that were committed");
   }
+  const bool copied = found->hasCounters || !found->results.empty();
+  if (!copied && frame <= culling_.frame) return {};  // `beginFrame` has done it
   if (frame > completed_ || frame <= culling_.frame) {
     return invalid("frame " + std::to_string(frame) +
                    " cannot be read back: it must be complete, which frames up to " +

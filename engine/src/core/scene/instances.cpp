@@ -423,6 +423,13 @@ Result<void> SceneBooks::rebuild(SceneInstance& instance, const InstanceChange& 
   if (mesh != nullptr &&
       mesh->info.morphTargetCount != meshes_.at(instance.mesh.index).info.morphTargetCount)
     changed.extras.morphs.clear();
+  const std::uint32_t targets = meshes_.at(instance.mesh.index).info.morphTargetCount;
+  if (mesh != nullptr && mesh->info.morphTargetCount != targets &&
+      changed.morphWriter != MorphWriter::cpu) {
+    return invalid("the instance has " + std::to_string(targets) +
+                   " morph weights, which the CPU does not write, but its mesh has " +
+                   std::to_string(mesh->info.morphTargetCount) + " targets");
+  }
   if (mesh != nullptr && changed.morphWriter == MorphWriter::clips &&
       changed.extras.writtenMorphs != 0)
     changed.extras.writtenMorphs = writtenTargets(changed, *mesh);
