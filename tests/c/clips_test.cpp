@@ -130,6 +130,55 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
   expectError(dermis_sample_pose(bank, nullptr, 2, 0, joints.data(), 1, &error), "layers is null");
 }
 
+TEST_F(CClipsTest, BoxesAreThoseOfCpp) {
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank);
+  dermis_primitive primitive = sized<dermis_primitive>();
+  expectOk(dermis_model_primitive(model, 0, &primitive, &error));
+  Owned<dermis_joint_bounds> bounds;
+  expectOk(dermis_joint_bounds_create(primitive.mesh, primitive.joint_count, nullptr, 0, &bounds,
+                                      &error));
+  const gltf::SkinnedPrimitive& skinned = expected.skinnedPrimitives[0];
+  const gltf::PrimitiveView view(expected.meshes[skinned.mesh].primitives[skinned.primitive]);
+  const JointBounds reach = must(jointBounds(view.mesh(), primitive.joint_count));
+  dermis_box box{};
+  expectOk(dermis_clip_box(bank, 1, 0, bounds, DERMIS_METHOD_LINEAR, DERMIS_PROMISE_SCALING, &box,
+                           &error));
+  Box found = must(clipBounds(same, 1, 0, reach, Method::linear));
+  EXPECT_TRUE(isSame(&box, &found, sizeof(box)));
+  const std::array<std::uint32_t, 2> blended{0, 2};
+  expectOk(dermis_blend_box(bank, blended.data(), 2, 0, bounds, DERMIS_METHOD_DEFAULT,
+                            DERMIS_PROMISE_SCALE_IGNORED, &box, &error));
+  found = must(
+      blendBounds(same, blended, 0, reach, Method::dualQuaternion, JointPromise::scaleIgnored));
+  EXPECT_TRUE(isSame(&box, &found, sizeof(box)));
+  expectError(dermis_clip_box(bank, 7, 0, bounds, DERMIS_METHOD_LINEAR, DERMIS_PROMISE_SCALING,
+                              &box, &error),
+              "7");
+  expectError(dermis_blend_box(bank, nullptr, 1, 0, bounds, DERMIS_METHOD_LINEAR,
+                               DERMIS_PROMISE_SCALING, &box, &error),
+              "clips is null");
+}
+
+// A scale of zeros is the default in C.
+TEST_F(CClipsTest, ANodeOfAModelThatIsHiddenStaysHidden) {
+  const std::string text = R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+    "nodes": [{"name": "hidden", "scale": [0, 0, 0]}], "skins": [{"joints": [0]}]})";
+  dermis_model_source file = sized<dermis_model_source>();
+  file.bytes = text.data();
+  file.byte_count = text.size();
+  Owned<dermis_model> hidden;
+  expectOk(dermis_model_load(&file, &hidden, &error));
+  expectOk(dermis_model_clips(hidden, &source, &error));
+  ASSERT_EQ(source.skin_count, 1u);
+  Owned<dermis_bank> bank;
+  expectOk(dermis_pack_clips(&source, &bank, &error));
+  JointMatrix joint;
+  expectOk(
+      dermis_sample_pose(bank, nullptr, 0, 0, reinterpret_cast<dermis_joint*>(&joint), 1, &error));
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(joint.m[i][i], 0.0f);
+}
+
 TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
   const std::array<float, 4> rest{0, 0.25f, 0.5f, 1}, times{0, 0.5f, 1, 2};
   std::array<float, 16> values{};
@@ -349,6 +398,13 @@ TEST_F(CClipsTest, FiguresPlay) {
   const std::array<dermis_clip_layer, 5> many{};
   wrong.layers = many.data();
   expectError(dermis_play_clips(scene, &wrong, 1, &error), "entry 0: there are 5 layers");
+  std::array<dermis_play, 2> second{plays[1], plays[0]};
+  second[1].layer_count = 1;
+  expectError(dermis_play_clips(scene, second.data(), 2, &error), "entry 1: layers is null");
+  second[1].layer_count = 0;
+  std::memcpy(&second[1].figure, &first, sizeof(first));
+  expectError(dermis_play_clips(scene, second.data(), 2, &error),
+              "entry 1: figure: this is the handle of a pose");
   expectError(dermis_remove_clips(scene, clipsOfScene, &error), "is used by 3 figures");
   expectError(dermis_remove_figure(scene, figures[0], &error), "is used by 1 instance");
   expectError(dermis_figure_pose(scene, figures[0], 1, &desc.pose, &error), "has no skin 1");

@@ -178,6 +178,38 @@ TEST(CMeshTest, CentersOfRotation) {
       "float_count is 599");
 }
 
+TEST(CMeshTest, BoxesAreThoseOfCpp) {
+  CMesh source(4);
+  const std::vector<JointMatrix> pose = samples::randomPose(3, 8, samples::Rigidity::shear);
+  const auto* joints = reinterpret_cast<const dermis_joint*>(pose.data());
+  const float ranges[] = {0, 0.5f, -1, 1, 0.25f, 0.25f};
+  const MorphRange same[] = {{0, 0.5f}, {-1, 1}, {0.25f, 0.25f}};
+  for (const bool hasRanges : {false, true}) {
+    Owned<dermis_joint_bounds> bounds;
+    expectOk(dermis_joint_bounds_create(&source.view, 8, hasRanges ? ranges : nullptr,
+                                        hasRanges ? 3 : 0, &bounds, &error));
+    const JointBounds expected =
+        must(jointBounds(source.mesh.view(), 8,
+                         hasRanges ? std::span<const MorphRange>(same) : std::span<MorphRange>()));
+    for (const dermis_promise promise : {DERMIS_PROMISE_SCALING, DERMIS_PROMISE_SCALE_IGNORED}) {
+      dermis_box box{};
+      expectOk(dermis_skinned_box(bounds, joints, 8, DERMIS_METHOD_BLENDED, promise, &box, &error));
+      const Box found =
+          skinnedBounds(expected, pose, Method::blended, static_cast<JointPromise>(promise));
+      EXPECT_TRUE(isSame(&box, &found, sizeof(box)));
+      EXPECT_LT(box.min[0], box.max[0]);
+    }
+    dermis_box box{};
+    expectError(dermis_skinned_box(bounds, nullptr, 8, DERMIS_METHOD_BLENDED,
+                                   DERMIS_PROMISE_SCALING, &box, &error),
+                "joints is null");
+  }
+  Owned<dermis_joint_bounds> none;
+  expectError(dermis_joint_bounds_create(&source.view, 8, ranges, 2, &none, &error), "");
+  expectError(dermis_joint_bounds_create(&source.view, 8, nullptr, 3, &none, &error),
+              "morph_ranges is null");
+}
+
 TEST(CMeshTest, PlacesAreThoseOfCpp) {
   for (const bool planar : {false, true}) {
     const dermis_layout layout = {DERMIS_FORMAT_SNORM16X4,
@@ -334,6 +366,9 @@ TEST(CMeshTest, TheReferenceIsThatOfCpp) {
     stored[i / 3 * 4 + i % 3] = static_cast<std::int16_t>(std::lround(positions[i] / 32 * 32767));
   }
   view.positions = {stored.data(), 8, DERMIS_FORMAT_SNORM16X4};
+  expectOk(dermis_compare(&posed, &view, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 1u);
+  view.positions.stride = 0;  // packed
   expectOk(dermis_compare(&posed, &view, &comparison, &error));
   EXPECT_EQ(comparison.passed, 1u);
   stored[0] = static_cast<std::int16_t>(stored[0] / 2 + 1000);

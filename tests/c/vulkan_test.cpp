@@ -177,6 +177,19 @@ TEST_F(CVulkanTest, ABatchIsRecorded) {
   expectOk(dermis_prepare(second, nullptr, &like, &error));
   expectOk(dermis_record_plan(second, commandBuffer, plan, bindings, &error));
   EXPECT_EQ(mock.dispatches.size(), info.dispatch_count);
+  // Another tuning has other pipelines.
+  tuning.workgroup_size = tuning.workgroup_size == 32 ? 64 : 32;
+  expectOk(dermis_make_plan(&batch, &limits, &tuning, &plan, &error));
+  expectError(dermis_record_plan(second, commandBuffer, plan, bindings, &error), "dermis_prepare",
+              DERMIS_NOT_PREPARED);
+  std::uint32_t count = 0;
+  expectOk(dermis_list_pipelines(nullptr, &like, &limits, &tuning, nullptr, 0, &count, &error));
+  std::vector<std::uint64_t> pipelines(count);
+  expectOk(dermis_list_pipelines(nullptr, &like, &limits, &tuning, pipelines.data(), count, &count,
+                                 &error));
+  expectOk(dermis_prepare_pipelines(second, pipelines.data(), count, &error));
+  expectOk(dermis_record_plan(second, commandBuffer, plan, bindings, &error));
+  expectError(dermis_prepare_pipelines(second, nullptr, 1, &error), "pipelines is null");
   buffers.meshes.offset = 1;
   Owned<dermis_bindings> misaligned;
   expectError(dermis_bindings_create(second, &buffers, &misaligned, &error), "");
@@ -236,7 +249,7 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
     tuning.workgroup_size = 3;
     desc.tuning = &tuning;
     expectError(dermis_recorder_create(cContext, &desc, &recorder, &error), "workgroup");
-    desc.tuning = nullptr;
+    tuning.workgroup_size = 32;  // not that of the context
     expectOk(dermis_recorder_create(cContext, &desc, &recorder, &error));
     EXPECT_TRUE(std::ranges::any_of(allocator.usages, [](VkBufferUsageFlags usage) {
       return (usage & VK_BUFFER_USAGE_INDEX_BUFFER_BIT) != 0;
@@ -274,12 +287,14 @@ TEST_F(CVulkanTest, ARecorderWithTheEnginesMemory) {
     expectError(dermis_driven_range(recorder, rigged, nullptr, &error), "range is null");
     expectError(dermis_driven_range(nullptr, rigged, &range, &error), "recorder is null");
     expectOk(dermis_begin_frame(scene, 1, 0, &error));
-    expectOk(dermis_mark_written(scene, &figure.pose, 1, &error));
+    std::array poses{figure.pose, figure.pose};
+    poses[1].kind = 77;
+    expectError(dermis_mark_written(scene, poses.data(), 2, &error), "nothing that Dermis made");
     expectOk(dermis_record(recorder, commandBuffer, VK_NULL_HANDLE, 0, &error));
     dermis_recorder_info info = sized<dermis_recorder_info>();
     expectOk(dermis_recorder_contents(recorder, &info, &error));
     EXPECT_EQ(info.dispatches, mock.dispatches.size());
-    EXPECT_GT(info.dispatches, 0u);
+    EXPECT_GT(info.dispatches, 0u) << "the pose before the wrong one is marked";
     EXPECT_LT(info.gpu_seconds, 0);
     EXPECT_TRUE(std::ranges::any_of(allocator.memory, [&](const auto& memory) {
       return reinterpret_cast<VkBuffer>(memory.get()) == info.output_buffer;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "dermis/cpu.h"
+#include "dermis/dermis.h"
 #include "kit/device.h"
 #include "played_clips.h"
 #include "rigged.h"
@@ -307,6 +308,27 @@ PackedClips longClips() {
 
 // What the first of several jobs finds, the others wait for. If it has no memory for that, another
 // one must be able to do it.
+TEST(CAllocationTest, AFunctionWithoutMemorySaysSo) {
+  bool isEnough = false;
+  for (std::uint32_t given = 0; !isEnough; ++given) {
+    dermis_runner* runner = nullptr;
+    dermis_error error{};
+    allowed = given;
+    const dermis_code code = dermis_runner_create(nullptr, &runner, &error);
+    allowed = ~0u;
+    isEnough = code == DERMIS_OK;
+    if (isEnough) {
+      EXPECT_GT(given, 3u);
+      dermis_destroy(runner);
+      continue;
+    }
+    ASSERT_EQ(code, DERMIS_OUT_OF_MEMORY) << given;
+    EXPECT_EQ(error.code, code);
+    EXPECT_STREQ(error.message, "there is not enough memory");
+    EXPECT_EQ(runner, nullptr);
+  }
+}
+
 TEST(CpuAllocationTest, AJobWithoutMemoryCanBeRunAgain) {
   const std::vector<std::string_view> targets = cpu::targetNames();
   for (const std::string_view target : {targets.front(), targets.back()}) {

@@ -17,8 +17,8 @@
 //   function returns belong to the object; the function says how long they are valid.
 // - `dermis_destroy` destroys every object that a function creates. Using a destroyed object is
 //   undefined. Using the handle of something that was removed is an error.
-// - One thread at a time may use an object. A context, a mesh, a bank, a packed rig and a model may
-//   be used by any number of threads. So may a plan, unless `dermis_make_plan` fills it.
+// - One thread at a time may use an object. A context, a packed mesh, a bank, a packed rig and a
+//   model may be used by any number of threads. So may a plan, unless `dermis_make_plan` fills it.
 // - Callbacks get their `user` pointer first, and must not throw or longjmp. If one that creates
 //   something fails, the function that needs it fails with its code and error; a code that is not
 //   from `DERMIS_INVALID_ARGUMENT` to `DERMIS_IO_ERROR` counts as `DERMIS_VULKAN_ERROR`.
@@ -282,6 +282,24 @@ DERMIS_C_API dermis_code dermis_repair(const dermis_mesh_view* mesh, uint32_t jo
                                        dermis_mesh_view* view, dermis_repaired** repaired,
                                        dermis_error* error);
 
+// How far the joints of a mesh reach, for boxes around it: for culling, and for positions in
+// snorm16. Any number of threads may use it.
+typedef struct dermis_joint_bounds dermis_joint_bounds;
+// Collects it for poses of `joint_count` joints, once. `morph_ranges`: the least and the largest
+// weight of each of `range_count` targets, two numbers each; without ranges 0 to 1.
+DERMIS_C_API dermis_code dermis_joint_bounds_create(const dermis_mesh_view* mesh,
+                                                    uint32_t joint_count, const float* morph_ranges,
+                                                    uint32_t range_count,
+                                                    dermis_joint_bounds** bounds,
+                                                    dermis_error* error);
+// Computes a box that contains the mesh in a pose, in a few microseconds. It is infinite for
+// methods without a proof, for joints that are not finite, and if the pose lacks a joint
+// (docs/bounds.md).
+DERMIS_C_API dermis_code dermis_skinned_box(const dermis_joint_bounds* bounds,
+                                            const dermis_joint* joints, uint32_t joint_count,
+                                            dermis_method method, dermis_promise promise,
+                                            dermis_box* box, dermis_error* error);
+
 // A packed mesh: the blob that a scene needs. It can be stored with the assets.
 typedef struct dermis_packed dermis_packed;
 // Packs a mesh for a skeleton of `joint_count` joints, 1 to 65536: all joint indices must be less.
@@ -528,7 +546,7 @@ typedef struct dermis_change {
   uint32_t morph_count;
 } dermis_change;
 // Applies changes, one after the other. If one fails, those before it remain, those after it are
-// not applied, and the message begins with "change " and its index.
+// not applied, and the message begins with "change " and its index. With a wrong `size`, none is.
 DERMIS_C_API dermis_code dermis_change_instances(dermis_scene* scene, const dermis_change* changes,
                                                  uint32_t count, dermis_error* error);
 
@@ -634,9 +652,10 @@ typedef struct dermis_runner_frame {
   uint64_t output_byte_count;
 } dermis_runner_frame;
 // Lists the jobs for everything that changed. Call it once after each `dermis_begin_frame` and
-// `dermis_abandon_frame`. Until the jobs are done, no other function of the runner or its scene may
-// be called. `vertices_per_job`: about how many; a job may have several instances. 0: 65536. For
-// N threads, an N-th of all vertices, or a quarter of that, spreads the work.
+// `dermis_abandon_frame`. Until the jobs are done, only `dermis_run_job` may be called of the
+// functions of the runner and its scene; if none is run, `dermis_abandon_frame`.
+// `vertices_per_job`: about how many; a job may have several instances. 0: 65536. For N threads, an
+// N-th of all vertices, or a quarter of that, spreads the work.
 DERMIS_C_API dermis_code dermis_runner_jobs(dermis_runner* runner, uint32_t vertices_per_job,
                                             dermis_runner_frame* frame, dermis_error* error);
 // Runs job number `index` of the frame. The jobs of a frame may run on any threads, in any order
@@ -656,10 +675,10 @@ typedef struct dermis_limits {
   uint64_t max_storage_buffer_range;
   uint32_t max_workgroup_count_x, max_workgroup_count_y;
   uint32_t max_storage_buffers_per_stage;
-  uint32_t one_output_range;  // whether a dispatch can bind only one window of the output
-  uint32_t texel_buffers;     // // whether kernels are those for CPU devices: needs shaderInt64
-                              // and scalarBlockLayout
-  uint32_t staged_stores;     // whether kernels store interleaved vertices widely
+  uint32_t one_output_range;       // whether a dispatch can bind only one window of the output
+  uint32_t texel_buffers;          // whether kernels are those for CPU devices: needs shaderInt64
+                                   // and scalarBlockLayout
+  uint32_t staged_stores;          // whether kernels store interleaved vertices widely
   uint32_t no_comparison_methods;  // whether kernels of methods for comparison are missing
 } dermis_limits;
 // How work is divided; it affects speed only. 0: the default.
@@ -793,7 +812,9 @@ typedef struct dermis_command {
 // The commands of a batch.
 typedef struct dermis_plan dermis_plan;
 // Turns a batch into commands. If *plan is null, a plan is created; otherwise it is filled again.
-// If the function fails, an existing plan is empty.
+// If the function fails, an existing plan is empty. For `dermis_record_plan`, limits and tuning
+// must be those of `dermis_context_create`, or the pipelines those of `dermis_list_pipelines` for
+// them.
 DERMIS_C_API dermis_code dermis_make_plan(const dermis_batch* batch, const dermis_limits* limits,
                                           const dermis_tuning* tuning, dermis_plan** plan,
                                           dermis_error* error);
@@ -821,7 +842,8 @@ DERMIS_C_API dermis_code dermis_write_tables(const dermis_plan* plan, void* byte
 // `count` gets how many there are. Limits and tuning are those of the commands. With a scene and
 // valid handles, only for the same kind of mesh and pose; with null handles, for any; without a
 // scene (`scene` may be null) for any, but poses of figures, and those with rigs unless
-// `driven_targets` is not 0. For an engine with its own RHI; others call `dermis_prepare`.
+// `driven_targets` is not 0. With a null pose, figures and rigs count if the scene has some. For an
+// engine with its own RHI; others call `dermis_prepare`.
 DERMIS_C_API dermis_code dermis_list_pipelines(const dermis_scene* scene,
                                                const dermis_instance_desc* desc,
                                                const dermis_limits* limits,
@@ -870,7 +892,7 @@ typedef struct dermis_commands_desc {
   dermis_code (*create_buffer)(void* user, const dermis_scene_buffer* buffer, void** mapped,
                                dermis_error* error);
   // Required. Releases a buffer that no frame in flight uses. Buffers that remain when the
-  // commands are destroyed are not released.
+  // commands are destroyed, or could not be created, are not released.
   void (*release_buffer)(void* user, uint32_t number);
 } dermis_commands_desc;
 // Owns a scene, and lists the commands of its frames.
@@ -956,7 +978,7 @@ typedef struct dermis_model_source {
 } dermis_model_source;
 // A file that was loaded.
 typedef struct dermis_model dermis_model;
-// Loads a file.
+// Loads a file. If it needs more memory than there is, it fails with `DERMIS_LIMIT_EXCEEDED`.
 DERMIS_C_API dermis_code dermis_model_load(const dermis_model_source* source, dermis_model** model,
                                            dermis_error* error);
 
@@ -1031,7 +1053,7 @@ typedef struct dermis_node {
   const char* name;  // for messages only
   double translation[3];
   double rotation[4];  // a quaternion: x, y, z, w; 0 0 0 0 counts as 0 0 0 1
-  double scale[3];     // 0 0 0 counts as 1 1 1
+  double scale[3];     // 0 0 0 counts as 1 1 1; to hide a node: 1e-300, which is 0 in float32
   const double*
       matrix;  // or null. 3 rows of 4, in place of the three above; no clip may animate it
   const float* weights;   // morph weights at rest
@@ -1153,6 +1175,18 @@ DERMIS_C_API dermis_code dermis_root_motion(const dermis_bank* bank, uint32_t cl
                                             double to, uint32_t hold, double displacement[3],
                                             double* turn, dermis_error* error);
 
+// Computes a box that contains a mesh of a skin at all times of a clip, and one for any blend of
+// clips that are not additive: once, at import. They are infinite as that of `dermis_skinned_box`.
+DERMIS_C_API dermis_code dermis_clip_box(const dermis_bank* bank, uint32_t clip, uint32_t skin,
+                                         const dermis_joint_bounds* bounds, dermis_method method,
+                                         dermis_promise promise, dermis_box* box,
+                                         dermis_error* error);
+DERMIS_C_API dermis_code dermis_blend_box(const dermis_bank* bank, const uint32_t* clips,
+                                          uint32_t clip_count, uint32_t skin,
+                                          const dermis_joint_bounds* bounds, dermis_method method,
+                                          dermis_promise promise, dermis_box* box,
+                                          dermis_error* error);
+
 // Adds a bank to a scene, which keeps its bytes: it may then be destroyed.
 DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank,
                                           dermis_clips* clips, dermis_error* error);
@@ -1160,7 +1194,8 @@ DERMIS_C_API dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank
 DERMIS_C_API dermis_code dermis_remove_clips(dermis_scene* scene, dermis_clips clips,
                                              dermis_error* error);
 // Adds figures, which rest until they play. `rigs` are those of their poses, one or zeros for each
-// skin of the bank; `rig_count` may be 0. If it fails, it adds none.
+// skin of the bank; `rig_count` may be 0. If it fails, it adds none; what those before the failure
+// took is free when the frame is complete.
 DERMIS_C_API dermis_code dermis_add_figures(dermis_scene* scene, dermis_clips clips,
                                             const dermis_rig* rigs, uint32_t rig_count,
                                             uint32_t count, dermis_figure* figures,
@@ -1365,10 +1400,15 @@ DERMIS_C_API dermis_code dermis_context_create(const dermis_device_desc* desc,
                                                dermis_limits* limits, dermis_tuning* tuning,
                                                dermis_context** context, dermis_error* error);
 // Builds every pipeline that instances like this one can need. Call it before such an instance is
-// recorded. `scene` and `desc` as for
-// `dermis_list_pipelines`. May take long. Without a scene, any thread may call it.
+// recorded. `scene` and `desc` as for `dermis_list_pipelines`; the tuning is that of the recorder,
+// without a scene that of the context. May take long. Without a scene, any thread may call it.
 DERMIS_C_API dermis_code dermis_prepare(const dermis_context* context, const dermis_scene* scene,
                                         const dermis_instance_desc* desc, dermis_error* error);
+// Builds these pipelines of `dermis_list_pipelines`: before `dermis_record_plan`, if a plan was
+// made with another tuning than the context's. Any thread may call it.
+DERMIS_C_API dermis_code dermis_prepare_pipelines(const dermis_context* context,
+                                                  const uint64_t* pipelines, uint32_t count,
+                                                  dermis_error* error);
 // Records a barrier for all memory between two uses, outside a render pass: before `dermis_record`
 // between the last use of the output and `DERMIS_USE_DERMIS`, and after it between that and the
 // next use. To read vertices back by a copy, also from `COPY_WRITE` to `HOST_READ` after the copy.

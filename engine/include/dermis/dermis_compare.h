@@ -46,7 +46,7 @@ DERMIS_COMPARE_API dermis_code dermis_reference_skin(const dermis_posed_mesh* po
 // One attribute of skinned vertices in memory. Needs no alignment.
 typedef struct dermis_skinned_attribute {
   const void* data;  // of vertex 0; null if it is absent
-  uint32_t stride;   // bytes
+  uint32_t stride;   // bytes; 0: that of its format
   dermis_format format;
 } dermis_skinned_attribute;
 // The vertices that are compared.

@@ -137,6 +137,7 @@ ClipsForCaller::ClipsForCaller(const Skeleton& skeleton, std::span<const ClipVie
     std::ranges::copy(node.translation, result.translation);
     std::ranges::copy(node.rotation, result.rotation);
     std::ranges::copy(node.scale, result.scale);
+    if (isZero(result.scale)) result.scale[0] = 1e-300;  // 0 in float32, and not the default
     result.weights = node.weights.data();
     result.weight_count = static_cast<std::uint32_t>(node.weights.size());
     if (!node.matrix) continue;
@@ -256,6 +257,30 @@ dermis_code dermis_root_motion(const dermis_bank* bank, uint32_t clip, double fr
   });
 }
 
+dermis_code dermis_clip_box(const dermis_bank* bank, uint32_t clip, uint32_t skin,
+                            const dermis_joint_bounds* bounds, dermis_method method,
+                            dermis_promise promise, dermis_box* box, dermis_error* error) {
+  return guarded(error, [&] {
+    const PackedClips& source = required(bank, "bank").clips;
+    const JointBounds& mesh = required(bounds, "bounds").bounds;
+    dermis_box& result = required(box, "box");
+    result =
+        boxOf(must(clipBounds(source, clip, skin, mesh, methodOf(method), promiseOf(promise))));
+  });
+}
+
+dermis_code dermis_blend_box(const dermis_bank* bank, const uint32_t* clips, uint32_t clip_count,
+                             uint32_t skin, const dermis_joint_bounds* bounds, dermis_method method,
+                             dermis_promise promise, dermis_box* box, dermis_error* error) {
+  return guarded(error, [&] {
+    const PackedClips& source = required(bank, "bank").clips;
+    const JointBounds& mesh = required(bounds, "bounds").bounds;
+    dermis_box& result = required(box, "box");
+    result = boxOf(must(blendBounds(source, array(clips, clip_count, "clips"), skin, mesh,
+                                    methodOf(method), promiseOf(promise))));
+  });
+}
+
 dermis_code dermis_add_clips(dermis_scene* scene, const dermis_bank* bank, dermis_clips* clips,
                              dermis_error* error) {
   return guarded(error, [&] {
@@ -311,13 +336,19 @@ dermis_code dermis_play_clips(dermis_scene* scene, const dermis_play* plays, uin
     const std::span<const dermis_play> all = array(plays, count, "plays");
     std::vector<ClipLayer> layers;
     std::vector<FigurePlay> converted;
-    for (const dermis_play& play : all)
-      appendLayers(array(play.layers, play.layer_count, "a figure's layers"), layers);
-    std::size_t first = 0;
     for (const dermis_play& play : all) {
-      converted.push_back(
-          {handleOf(play.figure), std::span(layers).subspan(first, play.layer_count)});
-      first += play.layer_count;
+      try {
+        converted.push_back({handleOf(play.figure), {}});
+        appendLayers(array(play.layers, play.layer_count, "layers"), layers);
+      } catch (Failure& failure) {
+        failure.message.insert(0, "entry " + std::to_string(&play - all.data()) + ": ");
+        throw;
+      }
+    }
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      converted[i].layers = std::span(layers).subspan(first, all[i].layer_count);
+      first += all[i].layer_count;
     }
     must(target.play(converted));
   });

@@ -37,9 +37,10 @@ void copyTo(double* to, const std::vector<Vector>& from) {
 }
 
 SkinnedAttribute attributeOf(const dermis_skinned_attribute& attribute, std::uint32_t count) {
-  return {attribute.data, attribute.data == nullptr ? 0 : count, attribute.stride,
-          static_cast<VertexFormat>(enumerator(attribute.format, DERMIS_FORMAT_OCTAHEDRAL8X2,
-                                               "the format of an attribute"))};
+  const auto format = static_cast<VertexFormat>(
+      enumerator(attribute.format, DERMIS_FORMAT_OCTAHEDRAL8X2, "the format of an attribute"));
+  const std::uint32_t stride = attribute.stride == 0 ? formatSize(format) : attribute.stride;
+  return {attribute.data, attribute.data == nullptr ? 0 : count, stride, format};
 }
 
 }  // namespace

@@ -139,11 +139,14 @@ struct CommandList {
 
 // ---- Objects that several files use.
 
+struct dermis_recorder;
+
 /// A scene of a recorder, a runner or commands.
 struct dermis_scene : dermis::c::Object {
   dermis_scene() { isLent = true; }
 
   dermis::Scene* scene = nullptr;
+  const dermis_recorder* recorder = nullptr;      ///< whose scene it is, or null
   std::uint64_t changes = 0;                      ///< calls of functions that may change it
   std::vector<dermis_instance> skinned, settled;  ///< of `dermis_scene_contents`
 };
@@ -152,6 +155,12 @@ struct dermis_packed : dermis::c::Object {
   explicit dermis_packed(dermis::PackedMesh made) : mesh(std::move(made)) {}
 
   dermis::PackedMesh mesh;
+};
+
+struct dermis_joint_bounds : dermis::c::Object {
+  explicit dermis_joint_bounds(dermis::JointBounds made) : bounds(std::move(made)) {}
+
+  dermis::JointBounds bounds;
 };
 
 struct dermis_repaired : dermis::c::Object {

@@ -51,6 +51,31 @@ dermis_code dermis_pack(const dermis_mesh_view* mesh, uint32_t joint_count, derm
   });
 }
 
+dermis_code dermis_joint_bounds_create(const dermis_mesh_view* mesh, uint32_t joint_count,
+                                       const float* morph_ranges, uint32_t range_count,
+                                       dermis_joint_bounds** bounds, dermis_error* error) {
+  return guarded(error, [&] {
+    const View view(mesh);
+    std::vector<MorphRange> ranges;
+    const auto numbers = array(morph_ranges, std::size_t{2} * range_count, "morph_ranges");
+    for (std::size_t i = 0; i < numbers.size(); i += 2)
+      ranges.push_back({numbers[i], numbers[i + 1]});
+    dermis_joint_bounds*& result = required(bounds, "bounds");
+    result = new dermis_joint_bounds(must(jointBounds(view.mesh, joint_count, ranges)));
+  });
+}
+
+dermis_code dermis_skinned_box(const dermis_joint_bounds* bounds, const dermis_joint* joints,
+                               uint32_t joint_count, dermis_method method, dermis_promise promise,
+                               dermis_box* box, dermis_error* error) {
+  return guarded(error, [&] {
+    const JointBounds& mesh = required(bounds, "bounds").bounds;
+    dermis_box& result = required(box, "box");
+    result = boxOf(skinnedBounds(mesh, jointsOf(joints, joint_count, "joints"), methodOf(method),
+                                 promiseOf(promise)));
+  });
+}
+
 dermis_code dermis_packed_load(const void* bytes, size_t byte_count, dermis_packed** packed,
                                dermis_error* error) {
   return guarded(error, [&] {

@@ -67,7 +67,11 @@ dermis_code report(dermis_error* error, dermis_code code, std::string_view messa
   if (error == nullptr) return code;
   error->code = code;
   error->vulkan_result = vulkanResult;
-  cutTo(error->message, inWordsOfC(std::string(message)));
+  try {
+    cutTo(error->message, inWordsOfC(std::string(message)));
+  } catch (...) {  // no memory
+    cutTo(error->message, message);
+  }
   return code;
 }
 

@@ -11,6 +11,17 @@ void convertList(std::span<const InstanceHandle> from, std::vector<dermis_instan
   for (const InstanceHandle instance : from) to.push_back(handleTo<dermis_instance>(instance));
 }
 
+/// Appends handles up to the first that is wrong, and returns what is wrong with it.
+template <typename CHandle, typename CppHandle>
+std::optional<Failure> appendHandles(std::span<const CHandle> from, std::vector<CppHandle>& to) {
+  try {
+    for (const CHandle& handle : from) to.push_back(handleOf(handle));
+  } catch (Failure& failure) {
+    return std::move(failure);
+  }
+  return std::nullopt;
+}
+
 InstanceChange changeOf(const dermis_change& change) {
   InstanceChange result;
   const auto has = [&](std::uint32_t bit) { return (change.what & bit) != 0; };
@@ -123,8 +134,9 @@ dermis_code dermis_mark_written(dermis_scene* scene, const dermis_pose* poses, u
   return guarded(error, [&] {
     Scene& target = changedScene(scene);
     std::vector<PoseHandle> handles;
-    for (const dermis_pose& pose : array(poses, count, "poses")) handles.push_back(handleOf(pose));
+    const auto failure = appendHandles(array(poses, count, "poses"), handles);
     must(target.markWritten(handles));
+    if (failure) throw *failure;
   });
 }
 
@@ -133,9 +145,9 @@ dermis_code dermis_mark_morphs_written(dermis_scene* scene, const dermis_instanc
   return guarded(error, [&] {
     Scene& target = changedScene(scene);
     std::vector<InstanceHandle> handles;
-    for (const dermis_instance& instance : array(instances, count, "instances"))
-      handles.push_back(handleOf(instance));
+    const auto failure = appendHandles(array(instances, count, "instances"), handles);
     must(target.markMorphsWritten(handles));
+    if (failure) throw *failure;
   });
 }
 

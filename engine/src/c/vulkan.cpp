@@ -189,7 +189,25 @@ dermis_code dermis_context_create(const dermis_device_desc* callers, dermis_limi
 
 dermis_code dermis_prepare(const dermis_context* context, const dermis_scene* scene,
                            const dermis_instance_desc* desc, dermis_error* error) {
-  return guarded(error, [&] { must(contextOf(context).prepare(needsOf(scene, desc))); });
+  return guarded(error, [&] {
+    const vulkan::Context& target = contextOf(context);
+    if (scene != nullptr && scene->recorder != nullptr) {  // which may have a tuning of its own
+      must(scene->recorder->recorder->prepare(instanceOf(in(desc, "desc"))));
+    } else {
+      must(target.prepare(needsOf(scene, desc)));
+    }
+  });
+}
+
+dermis_code dermis_prepare_pipelines(const dermis_context* context, const uint64_t* pipelines,
+                                     uint32_t count, dermis_error* error) {
+  return guarded(error, [&] {
+    const vulkan::Context& target = contextOf(context);
+    std::vector<PipelineId> ids;
+    for (const std::uint64_t id : array(pipelines, count, "pipelines"))
+      ids.push_back(static_cast<PipelineId>(id));
+    must(target.prepare(ids));
+  });
 }
 
 dermis_code dermis_record_barrier(const dermis_context* context, VkCommandBuffer command_buffer,
@@ -267,6 +285,7 @@ dermis_code dermis_recorder_create(const dermis_context* context,
     }
     made->recorder.emplace(must(vulkan::SceneRecorder::create(target, description)));
     made->scene.scene = &made->recorder->scene();
+    made->scene.recorder = made.get();
     result = made.release();
   });
 }
