@@ -168,12 +168,12 @@ enum class PipelineId : std::uint64_t {};
 /// motion and bounds, and if each offset differs by a multiple of 4 bytes. Offsets of attributes of
 /// one interleaved vertex must all differ by the same number.
 ///
-/// They are: the palette kernel with and without scale; the clear kernel, for bounds and snorm16
-/// positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly 4, for 4 with
-/// joints that scale, for any number, and for any number with morph targets. Some methods need
-/// fewer. With `texelBuffers` each skin kernel may be listed twice: with stores of up to 32 bytes,
-/// for jobs whose attributes are all aligned to the size of their stores, and with narrower stores,
-/// for all other jobs.
+/// They are: the palette kernel for each promise of poses, but for `linear`; the clear kernel, for
+/// bounds and snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly
+/// 4, for 4 with joints that scale, for any number, and for any number with morph targets. Some
+/// methods need fewer. With `texelBuffers` each skin kernel may be listed twice: with stores of up
+/// to 32 bytes, for jobs whose attributes are all aligned to the size of their stores, and with
+/// narrower stores, for all other jobs.
 ///
 /// Fails with `invalidArgument` if the job's method, motion, formats or runs of attributes, the
 /// limits or the tuning are not valid.
@@ -274,8 +274,8 @@ struct DispatchCommand {
   /// If indirect: where the VkDispatchIndirectCommand is, in bytes from the beginning of the buffer
   /// of `bindings[0]`.
   std::optional<std::uint64_t> indirectOffset;
-  /// Push constants from offset 0, the first `constantCount` words: PalettePush, ClearPush,
-  /// SkinPush, VisibilityPush, SamplePush or ComposePush of shaders/abi.h.
+  /// Push constants from offset 0, the first `constantCount` words: the structure of
+  /// shaders/abi.h that is named after the kernel, such as SkinPush.
   std::array<std::uint32_t, 9> constants{};
   std::uint32_t constantCount = 0;
   /// Valid as long as the commands. They are all that the kernel declares: a descriptor of a slot

@@ -341,7 +341,8 @@ class DERMIS_CORE_API Scene {
   /// Removes a figure and its poses. Fails with `invalidArgument` if an instance uses one of them.
   Result<void> removeFigure(FigureHandle figure);
   /// The pose of a figure for a skin of its bank. It has the promise `JointPromise::rigid` if the
-  /// clips cannot scale the joints of the skin, otherwise `scaling`. Fails with `invalidArgument`
+  /// clips cannot scale the joints of the skin and its rig, if any, `isRigid`; otherwise `scaling`.
+  /// Fails with `invalidArgument`
   /// if there is no such skin.
   Result<PoseHandle> pose(FigureHandle figure, std::uint32_t skin = 0) const;
 
@@ -356,9 +357,11 @@ class DERMIS_CORE_API Scene {
 
   /// What `vulkan::Context::prepare` needs before such an instance is recorded. If both handles are
   /// valid, only for instances with the same method whose mesh has the same minimum and maximum of
-  /// influences and whose pose has the same promise: two kernels for most instances. If a handle
-  /// is null, for any mesh or pose: up to ten. Fails with `invalidArgument` if the method is not
-  /// valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
+  /// influences and whose pose is like this one in its promise, as that of a figure, and by having
+  /// a rig: two kernels for most instances. If a handle is null, for any mesh or pose: about ten.
+  /// With a null pose, figures and rigs count only if the scene has some: set
+  /// `PipelineNeeds::figures` and `rigs` before that. Fails with `invalidArgument` if the method is
+  /// not valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
 
   // -- What changes.

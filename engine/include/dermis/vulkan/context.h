@@ -276,7 +276,7 @@ class DERMIS_VULKAN_API Context {
   static Result<Context> create(const DeviceDescription& description);
 
   ~Context();
-  /// A Context may be moved while its bindings and systems exist and while frames are in flight,
+  /// A Context may be moved while its bindings and recorders exist and while frames are in flight,
   /// but not while another thread calls one of its functions.
   Context(Context&&) noexcept;
   Context& operator=(Context&&) noexcept;
