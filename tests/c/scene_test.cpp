@@ -1005,6 +1005,41 @@ TEST(CModelTest, IsThatOfCpp) {
               "no skinned primitive");
 }
 
+TEST(CModelTest, ItsRigIsThatOfCpp) {
+  const std::string path = std::string(sampleModels) + "/rigged_arm.glb";
+  dermis_model_source source = sized<dermis_model_source>();
+  source.path = path.c_str();
+  Owned<dermis_model> model;
+  expectOk(dermis_model_load(&source, &model, &error));
+  gltf::Model same = must(gltf::load(path));
+  Owned<dermis_packed_rig> rig;
+  expectError(dermis_model_apply_rig(model, 9, nullptr, &rig, &error), "no skin 9");
+  expectError(dermis_model_apply_rig(model, 0, "{", &rig, &error), "", DERMIS_INVALID_DATA);
+  EXPECT_EQ(rig.object, nullptr);
+  expectOk(dermis_model_apply_rig(model, 0, nullptr, &rig, &error));
+  const PackedRig expected = must(packRig(*must(gltf::applyRig(same, 0, same.skins[0].rig))));
+  dermis_packed_rig_info info = sized<dermis_packed_rig_info>();
+  expectOk(dermis_packed_rig_contents(rig, &info, &error));
+  ASSERT_EQ(info.byte_count, expected.bytes().size());
+  EXPECT_TRUE(isSame(info.bytes, expected.bytes().data(), info.byte_count));
+  const std::uint32_t joints = expected.writtenJoints() + expected.drivenJoints();
+  for (std::uint32_t i = 0; i < same.skinnedPrimitives.size(); ++i) {
+    const gltf::SkinnedPrimitive& skinned = same.skinnedPrimitives[i];
+    const gltf::PrimitiveView view(same.meshes[skinned.mesh].primitives[skinned.primitive]);
+    dermis_primitive primitive = sized<dermis_primitive>();
+    expectOk(dermis_model_primitive(model, i, &primitive, &error));
+    EXPECT_EQ(primitive.joint_count, expected.writtenJoints());
+    Owned<dermis_packed> packed;
+    expectOk(dermis_pack(primitive.mesh, joints, &packed, &error));
+    const PackedMesh mesh = must(pack(view.mesh(), joints));
+    dermis_packed_info contents = sized<dermis_packed_info>();
+    expectOk(dermis_packed_contents(packed, &contents, &error));
+    ASSERT_EQ(contents.byte_count, mesh.bytes().size());
+    EXPECT_TRUE(isSame(contents.bytes, mesh.bytes().data(), contents.byte_count));
+  }
+  expectError(dermis_model_apply_rig(nullptr, 0, nullptr, &rig, &error), "model is null");
+}
+
 // A triangle with two morph targets, the second of which the node activates.
 TEST(CModelTest, MorphTargetsAndFilesInMemory) {
   const std::string text =

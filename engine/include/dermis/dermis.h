@@ -1004,7 +1004,7 @@ DERMIS_C_API dermis_code dermis_model_contents(const dermis_model* model, dermis
 typedef struct dermis_primitive {
   uint32_t size;
   uint32_t skin;         // primitives with the same number have the same pose
-  uint32_t joint_count;  // of its poses
+  uint32_t joint_count;  // of its poses; without those that a rig drives
   // For `dermis_validate` and `dermis_pack`. If it has no influence sets, it is not skinned: draw
   // it in bind pose.
   const dermis_mesh_view* mesh;
@@ -1296,6 +1296,14 @@ DERMIS_C_API dermis_code dermis_pack_rig(const dermis_rig_source* source, dermis
 // Makes a rig from stored bytes, which it copies and checks.
 DERMIS_C_API dermis_code dermis_packed_rig_load(const void* bytes, size_t byte_count,
                                                 dermis_packed_rig** rig, dermis_error* error);
+// Reads a rig of a skin of a glTF model, JSON as docs/rigs.md describes it, and applies it to the
+// model, once for a skin: primitives get the joint numbers of the rig, so `dermis_pack` needs
+// written and driven joints, and the morph targets that it drives come last. `json`: null means
+// what the file has. No other thread may use the model meanwhile. What was got from it before is
+// invalid after a success.
+DERMIS_C_API dermis_code dermis_model_apply_rig(dermis_model* model, uint32_t skin,
+                                                const char* json, dermis_packed_rig** rig,
+                                                dermis_error* error);
 // What is known of a packed rig.
 typedef struct dermis_packed_rig_info {
   uint32_t size;

@@ -11,6 +11,7 @@
 #include "dermis/layout.h"
 #include "dermis/mesh.h"
 #include "dermis/plan.h"
+#include "dermis/rig.h"
 #include "dermis/scene.h"
 #include "object.h"
 
@@ -161,6 +162,12 @@ struct dermis_joint_bounds : dermis::c::Object {
   explicit dermis_joint_bounds(dermis::JointBounds made) : bounds(std::move(made)) {}
 
   dermis::JointBounds bounds;
+};
+
+struct dermis_packed_rig : dermis::c::Object {
+  explicit dermis_packed_rig(dermis::PackedRig made) : rig(std::move(made)) {}
+
+  dermis::PackedRig rig;
 };
 
 struct dermis_repaired : dermis::c::Object {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <deque>
 #include <memory>
+#include <optional>
 
 #include "clips.h"
 #include "convert.h"
@@ -11,7 +12,15 @@ using namespace dermis;
 using namespace dermis::c;
 
 struct dermis_model : Object {
-  explicit dermis_model(gltf::Model loaded) : model(std::move(loaded)) {
+  explicit dermis_model(gltf::Model loaded) : model(std::move(loaded)) { list(); }
+
+  /// Makes what callers get, whenever the model has changed.
+  void list() {
+    skeleton = gltf::skeleton(model);
+    animations.emplace(skeleton, gltf::clips(model));
+    views.clear();
+    clips.clear();
+    notes.clear();
     for (const gltf::SkinnedPrimitive& skinned : model.skinnedPrimitives) {
       const gltf::PrimitiveView view(primitive(skinned));
       views.emplace_back(view.mesh());
@@ -25,8 +34,8 @@ struct dermis_model : Object {
   }
 
   gltf::Model model;
-  const Skeleton skeleton{gltf::skeleton(model)};
-  const ClipsForCaller animations{skeleton, gltf::clips(model)};
+  Skeleton skeleton;
+  std::optional<ClipsForCaller> animations;
   std::deque<ViewForCaller> views;  ///< of the skinned primitives
   std::vector<dermis_clip> clips;
   std::vector<const char*> notes;
@@ -75,6 +84,20 @@ dermis_code dermis_model_load(const dermis_model_source* callers, dermis_model**
   });
 }
 
+dermis_code dermis_model_apply_rig(dermis_model* model, uint32_t skin, const char* json,
+                                   dermis_packed_rig** rig, dermis_error* error) {
+  return guarded(error, [&] {
+    dermis_model& target = required(model, "model");
+    dermis_packed_rig*& result = required(rig, "rig");
+    if (skin >= target.model.skins.size()) fail("the model has no skin " + std::to_string(skin));
+    const std::string drivers = json != nullptr ? json : target.model.skins[skin].rig;
+    if (drivers.empty()) fail("the file has no rig for skin " + std::to_string(skin));
+    const auto applied = must(gltf::applyRig(target.model, skin, drivers));
+    target.list();
+    result = new dermis_packed_rig(must(packRig(*applied)));
+  });
+}
+
 dermis_code dermis_model_contents(const dermis_model* model, dermis_model_info* info,
                                   dermis_error* error) {
   return guarded(error, [&] {
@@ -119,7 +142,7 @@ dermis_code dermis_model_clips(const dermis_model* model, dermis_clips_source* c
   return guarded(error, [&] {
     const dermis_model& source = required(model, "model");
     checkOut(clips, "source");
-    give(clips, source.animations.source);
+    give(clips, source.animations->source);
   });
 }
 

@@ -15,6 +15,10 @@ extern "C" {
 dermis_code dermis_model_load(const dermis_model_source*, dermis_model**, dermis_error* error) {
   return missing(error);
 }
+dermis_code dermis_model_apply_rig(dermis_model*, uint32_t, const char*, dermis_packed_rig**,
+                                   dermis_error* error) {
+  return missing(error);
+}
 dermis_code dermis_model_contents(const dermis_model*, dermis_model_info*, dermis_error* error) {
   return missing(error);
 }

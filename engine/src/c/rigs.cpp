@@ -8,12 +8,6 @@
 using namespace dermis;
 using namespace dermis::c;
 
-struct dermis_packed_rig : Object {
-  explicit dermis_packed_rig(PackedRig made) : rig(std::move(made)) {}
-
-  PackedRig rig;
-};
-
 namespace {
 
 /// Both have the same bytes.
