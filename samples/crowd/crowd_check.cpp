@@ -90,6 +90,7 @@ void CrowdCheck::samplePoses(std::span<const ShownInstance> instances) {
       }
     }
   }
+  if (missing.empty()) return;
   const std::vector<Playing> added(missing.begin(), missing.end());
   std::vector<std::vector<ClipLayer>> plays(added.size());
   for (std::size_t index = 0; index < added.size(); ++index)
@@ -194,12 +195,16 @@ void CrowdCheck::compare(std::uint64_t frame, std::span<const ShownInstance> ins
 }
 
 std::string CrowdCheck::complaint() const {
-  if (totals_.worstPose > 1)
-    return fmt::format("a pose is {:.3g} times its bound away from the clips", totals_.worstPose);
+  std::string complaint;
   if (totals_.failures != 0) {
-    return fmt::format("{} of {} instances are wrong; the first: {}", totals_.failures,
-                       totals_.instances, totals_.firstFailure);
+    complaint = fmt::format("{} of {} instances are wrong; the first: {}", totals_.failures,
+                            totals_.instances, totals_.firstFailure);
   }
+  if (totals_.worstPose > 1) {
+    complaint += fmt::format("{}a pose is {:.3g} times its bound away from the clips",
+                             complaint.empty() ? "" : "; ", totals_.worstPose);
+  }
+  if (!complaint.empty()) return complaint;
   if (overdue_ != 0)
     return fmt::format("{} times an instance was due but was not skinned", overdue_);
   return {};
