@@ -89,7 +89,8 @@ TEST(SmoothWalkOnDevice, SeldomUpdatesAreAsSmoothAsTheBarsSay) {
       });
 }
 
-const auto* const onDevice = ::testing::AddGlobalTestEnvironment(new OnDevice);
+const auto* const onDevice =
+    (destroyDevicesAtTheEnd(), ::testing::AddGlobalTestEnvironment(new OnDevice));
 
 }  // namespace
 }  // namespace dermis::test

@@ -26,8 +26,7 @@ class DestroyDevices : public ::testing::Environment {
     for (Attempt& attempt : attempts) attempt.device.reset();
   }
 };
-[[maybe_unused]] const ::testing::Environment* const destroyDevices =
-    ::testing::AddGlobalTestEnvironment(new DestroyDevices);
+[[maybe_unused]] const bool isRegistered = (destroyDevicesAtTheEnd(), true);
 
 /// The same for all devices of the process.
 PFN_vkGetInstanceProcAddr realInstanceProcAddr = nullptr;
@@ -90,6 +89,11 @@ void tryToCreate(bool pushDescriptors, Attempt& attempt) {
 }
 
 }  // namespace
+
+void destroyDevicesAtTheEnd() {
+  [[maybe_unused]] static const ::testing::Environment* const last =
+      ::testing::AddGlobalTestEnvironment(new DestroyDevices);
+}
 
 samples::DeviceOptions testDeviceOptions() {
   samples::DeviceOptions options;

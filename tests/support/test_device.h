@@ -18,6 +18,10 @@ samples::DeviceOptions testDeviceOptions();
 /// `reason` says why.
 samples::OpenDevice* testDevice(bool pushDescriptors, std::string& reason);
 
+/// Call it before `AddGlobalTestEnvironment` for an environment whose `TearDown` uses a device:
+/// what is registered first is torn down last.
+void destroyDevicesAtTheEnd();
+
 /// Whether a missing device must fail.
 bool isContinuousIntegration();
 
