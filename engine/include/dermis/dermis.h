@@ -1175,12 +1175,13 @@ DERMIS_C_API dermis_code dermis_root_motion(const dermis_bank* bank, uint32_t cl
                                             double to, uint32_t hold, double displacement[3],
                                             double* turn, dermis_error* error);
 
-// Computes a box that contains a mesh of a skin at all times of a clip, and one for any blend of
-// clips that are not additive: once, at import. They are infinite as that of `dermis_skinned_box`.
+// Computes a box that contains a mesh of a skin at all times of a clip: once, at import. It is
+// infinite as that of `dermis_skinned_box`.
 DERMIS_C_API dermis_code dermis_clip_box(const dermis_bank* bank, uint32_t clip, uint32_t skin,
                                          const dermis_joint_bounds* bounds, dermis_method method,
                                          dermis_promise promise, dermis_box* box,
                                          dermis_error* error);
+// The same for any blend of clips that are not additive.
 DERMIS_C_API dermis_code dermis_blend_box(const dermis_bank* bank, const uint32_t* clips,
                                           uint32_t clip_count, uint32_t skin,
                                           const dermis_joint_bounds* bounds, dermis_method method,
