@@ -131,7 +131,7 @@ TEST_F(CpuSceneRigTest, FiguresMayHaveRigs) {
   }
 }
 
-// What the figure played while nobody needed the rig.
+// The figure plays on while the skin with the rig is hidden.
 TEST_F(CpuSceneRigTest, ARigIsEvaluatedWhenItsSkinIsShownAgain) {
   constexpr std::uint32_t given = 3;
   const std::uint32_t node = weightedNode(given);

@@ -191,7 +191,7 @@ dermis_code dermis_prepare(const dermis_context* context, const dermis_scene* sc
                            const dermis_instance_desc* desc, dermis_error* error) {
   return guarded(error, [&] {
     const vulkan::Context& target = contextOf(context);
-    if (scene != nullptr && scene->recorder != nullptr) {  // which may have a tuning of its own
+    if (scene != nullptr && scene->recorder != nullptr) {  // its tuning may differ
       must(scene->recorder->recorder->prepare(instanceOf(in(desc, "desc"))));
     } else {
       must(target.prepare(needsOf(scene, desc)));
