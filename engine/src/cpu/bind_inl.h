@@ -41,7 +41,7 @@ DERMIS_INLINE Vec3<D> loadThree(D d, const float* first, std::size_t components,
 
 inline const float* blockOf(const std::vector<Lanes>& lanes, std::size_t components,
                             std::uint32_t block) {
-  return lanes.empty() ? nullptr : lanes[block * components].v;
+  return lanes.empty() ? nullptr : numbersOf(&lanes[block * components]);
 }
 
 inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block, bool isLone) {

@@ -18,7 +18,7 @@ class LocalsWriter {
  public:
   LocalsWriter(const PlanLocals& layout, std::vector<CacheLine>& lines) : layout_(layout) {
     lines.assign(linesOf(layout.size()), {});
-    first_ = lines.data()->v;
+    first_ = numbersOf(lines.data());
   }
 
   void set(std::size_t node, std::size_t path, std::span<const float> numbers) {
@@ -73,7 +73,7 @@ PlanClip planClip(const ClipBank& bank, const BankClip& clip, const PlanLocals& 
     const std::uint32_t word = bank.words[clip.tracks + i];
     const std::size_t node = i / 3, path = i % 3;
     const std::size_t place = LocalsWriter::placeOf(layout, node, path);
-    float* const base = plan.base.data()->v + place;
+    float* const base = numbersOf(plan.base.data()) + place;
     switch (static_cast<TrackKind>(word >> 30)) {
       case TrackKind::rest:
         break;
@@ -127,7 +127,7 @@ ClipPlan::ClipPlan(const PackedClips& packed) : bank(&packed) {
       mostTracks[format] = std::max(mostTracks[format], clip.tracks[format].tracks.size());
   }
   masks.resize(linesOf((std::size_t{from.header.maskCount} + 1) * locals.padded));
-  float* const factors = masks.data()->v;
+  float* const factors = numbersOf(masks.data());
   for (std::uint32_t mask = 0; mask <= from.header.maskCount; ++mask) {
     for (std::size_t node = 0; node < nodeCount; ++node)
       factors[mask * locals.padded + node] = from.mask(mask, node);

@@ -20,6 +20,16 @@ struct alignas(32) Lanes {
   float v[blockVertices] = {};
 };
 
+/// All numbers of consecutive lines or lanes, from the first on; `v` has only those of one.
+template <typename Line>
+float* numbersOf(Line* lines) {
+  return reinterpret_cast<float*>(lines);
+}
+template <typename Line>
+const float* numbersOf(const Line* lines) {
+  return reinterpret_cast<const float*>(lines);
+}
+
 /// Denotes an identity joint, the only joint of vertices without influences.
 inline constexpr std::uint32_t stillJoint = 0xffffffff;
 

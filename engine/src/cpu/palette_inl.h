@@ -26,7 +26,7 @@ inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
     memory.reserve(lines);  // exact size, no geometric growth
     memory.resize(lines);
   }
-  return memory.data()->v;
+  return numbersOf(memory.data());
 }
 
 inline bool needsRows(Method method) {

@@ -93,7 +93,7 @@ DERMIS_INLINE void skinBlocks(const MeshData& mesh, const Blocks& blocks, const 
                               float* const* outputs, const Skin& skin) {
   CacheLine buffers[blocksOf<D>][blockFloats * sizeof(float) / sizeof(CacheLine)];
   float* beside[blocksOf<D>];
-  for (std::size_t i = 0; i < blocksOf<D>; ++i) beside[i] = buffers[i]->v;
+  for (std::size_t i = 0; i < blocksOf<D>; ++i) beside[i] = numbersOf(buffers[i]);
   const auto skinPart = [&](std::uint32_t block, std::size_t first, std::size_t end) HWY_ATTR {
     skin(PlainTask{mesh, blocks.run, block, block + 1, block}, beside);
     for (std::size_t i = 0; i < blocksOf<D>; ++i) {

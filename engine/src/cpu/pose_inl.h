@@ -116,7 +116,7 @@ DERMIS_INLINE const float* matricesOf(const PoseTask& task, std::size_t first, s
   bool isRow = first + count <= task.joints.size();
   for (std::size_t i = 1; isRow && i < count; ++i) isRow = task.joints[first + i] == begin + i;
   if (isRow && begin != stillJoint && begin + count <= task.pose.size())
-    return &task.pose[begin].m[0][0];
+    return numbersOf(&task.pose[begin]);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t joint =
         first + i < task.joints.size() ? task.joints[first + i] : stillJoint;

@@ -115,8 +115,8 @@ inline HWY_ATTR void evaluateRigs(const PackedRig& rig, std::span<const RigPose>
     const RigPose* lanes[laneCount];
     for (std::size_t lane = 0; lane < laneCount; ++lane) {
       lanes[lane] = &poses[std::min(first + lane, poses.size() - 1)];
-      memory.written[lane] = lanes[lane]->written.data()->m[0];
-      memory.driven[lane] = reinterpret_cast<float*>(lanes[lane]->driven.data());
+      memory.written[lane] = numbersOf(lanes[lane]->written.data());
+      memory.driven[lane] = numbersOf(lanes[lane]->driven.data());
     }
     for (std::size_t weight = 0; weight < given; ++weight) {
       for (std::size_t lane = 0; lane < laneCount; ++lane)

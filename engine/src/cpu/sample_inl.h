@@ -290,7 +290,7 @@ DERMIS_INLINE WideLocals blend(const BlendTask& task, std::size_t node) {
   auto weights = zero;
   for (const LayerLocals& layer : task.blended) weights = hn::Add(weights, weightOf(layer, node));
   const auto isBlended = hn::Gt(weights, zero);
-  const float* const rest = task.plan.rest.data()->v;
+  const float* const rest = numbersOf(task.plan.rest.data());
   if (hn::AllFalse(d, isBlended)) return loadLocals(layout, rest, node);
   WideLocals sum{{zero, zero, zero}, {zero, zero, zero, zero}, {zero, zero, zero}};
   Vec4<Wide> first = sum.rotation;
@@ -455,7 +455,7 @@ inline HWY_ATTR void poseSkins(const ClipPlan& plan, const float* matrices,
       if (nodes[joint] == noNode) {
         std::memcpy(pose->m, inverse + 12 * joint, sizeof(pose->m));
       } else {
-        multiply(matrices + std::size_t{12} * nodes[joint], inverse + 12 * joint, pose->m[0]);
+        multiply(matrices + std::size_t{12} * nodes[joint], inverse + 12 * joint, numbersOf(pose));
       }
     }
   }
@@ -483,8 +483,8 @@ inline HWY_ATTR void sampleBatch(KeyBatch& batch, float* unused, std::size_t apa
 inline HWY_ATTR void sampleFigure(const ClipPlan& plan, const PackedLayers& layers,
                                   ClipScratch& scratch, std::span<JointMatrix> poses) {
   for (KeyBatch& batch : scratch.batches) batch.count = 0;
-  float* const locals = scratch.locals.data()->v;
-  float* const matrices = scratch.matrices.data()->v;
+  float* const locals = numbersOf(scratch.locals.data());
+  float* const matrices = numbersOf(scratch.matrices.data());
   LayerLocals sampled[maxClipLayers];
   std::size_t blended = 0;
   for (std::uint32_t i = 0; i < layers.count; ++i) {
@@ -492,10 +492,12 @@ inline HWY_ATTR void sampleFigure(const ClipPlan& plan, const PackedLayers& laye
     const PlanClip& clip = plan.clips[layer.clip()];
     float* const own = locals + plan.locals.size() * i;
     if (!clip.isAdditive) blended = i + 1;
-    std::memcpy(own, clip.base.data()->v, plan.locals.size() * 4);
-    sampled[i] = {
-        own, layer.mask() == 0 ? nullptr : plan.masks.data()->v + plan.locals.padded * layer.mask(),
-        fromHalf(layer.weight())};
+    std::memcpy(own, numbersOf(clip.base.data()), plan.locals.size() * 4);
+    sampled[i] = {own,
+                  layer.mask() == 0
+                      ? nullptr
+                      : numbersOf(plan.masks.data()) + plan.locals.padded * layer.mask(),
+                  fromHalf(layer.weight())};
     findRows(clip, layer.time, scratch.times.data());
     for (std::size_t format = 0; format < keyFormats; ++format) {
       if (!clip.tracks[format].tracks.empty()) {
