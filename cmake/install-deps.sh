@@ -2,10 +2,10 @@
 # Installs what Dermis needs to build and to run its tests, from Debian's packages (12 or 13). If everything is installed, it does
 # nothing and needs no privileges. On another system it lists the packages and ends with an error.
 #
-#   cmake/install-deps.sh [showcase|nightly|windows|x86|arm64|libcxx]
+#   cmake/install-deps.sh [sanitized|showcase|nightly|windows|x86|arm64|libcxx]
 #
-# showcase: also what DERMIS_BUILD_SHOWCASE needs. nightly: also what only tests/run.sh nightly needs. The others: also what its part
-# of that name needs.
+# sanitized: also what the sanitized half of tests/run.sh needs. showcase: also what DERMIS_BUILD_SHOWCASE needs. nightly: also what
+# tests/run.sh nightly needs. The others: also what its part of that name needs.
 set -eu
 
 packages="
@@ -22,17 +22,15 @@ doxygen
 "
 if [ "${1:-}" = nightly ]; then
   packages="$packages
-clang ffmpeg blender python3-numpy python3-cffi python3-matplotlib bindgen rustc spirv-cross
+ffmpeg blender python3-numpy python3-cffi python3-matplotlib bindgen rustc spirv-cross
 debootstrap lintian
 "
   command -v npm >/dev/null 2>&1 || packages="$packages nodejs npm" # from wherever they are
-  # libFuzzer and the sanitizers of the release's Clang.
-  if command -v apt-cache >/dev/null 2>&1; then
-    clang_runtime=$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/libclang-rt-\1-dev/p' | head -n 1)
-    packages="$packages $clang_runtime"
-  fi
 fi
 
+case ${1:-} in
+  sanitized|nightly) packages="$packages clang libclang-rt-dev" ;; # the latter: sanitizers and libFuzzer
+esac
 case ${1:-} in
   showcase|nightly) packages="$packages libsdl2-dev libimgui-dev xvfb xdotool" ;;
   windows) packages="$packages googletest g++-mingw-w64-x86-64-posix wine wine64" ;;

@@ -3,8 +3,8 @@
 #
 #   tests/run.sh                   what CI runs: `ci`, then `sanitized`. What both could run, `sanitized` runs
 #   tests/run.sh PRESET            ci, dev, release, asan or tsan: builds it, runs all tests of every change
-#   tests/run.sh sanitized         what needs no device and handles data from outside, with address and undefined-behavior sanitizers;
-#                                  fewer cases of what takes long
+#   tests/run.sh sanitized         what needs no device and handles data from outside, with Clang's address and undefined-behavior
+#                                  sanitizers; fewer cases of what takes long
 #   tests/run.sh nightly [PART...] what takes longer, in parts; without PART: all. tests/nightly/run.sh lists them
 #
 # Tests that need the models and poses of this project's machines look for them in $DERMIS_TEST_DATA, or else in ../shared, and are
@@ -80,11 +80,15 @@ sanitized() {
   kernels=build/ci/shaders/dermis_kernels
   [ -f build/ci/CMakeCache.txt ] || cmake --preset ci >build/ci.log
   cmake --build build/ci --target dermis_kernels
-  build_and_test build/sanitized "-L sanitized" asan -DDERMIS_SANITIZE_TESTS=OFF -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=ON \
-    -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_RUNTIME_COMPILER=OFF -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels" -DDERMIS_QUICK_OPTIMIZATION=-O0
+  # Clang compiles it in two thirds of GCC's time, and checks more.
+  build_and_test build/sanitized "-L sanitized" asan -DCMAKE_CXX_COMPILER=clang++ -DDERMIS_SANITIZE_TESTS=OFF \
+    -DDERMIS_BUILD_SAMPLES=OFF -DDERMIS_BUILD_TESTS=ON -DDERMIS_BUILD_SHADER_COMPILER=ON -DDERMIS_RUNTIME_COMPILER=OFF -DDERMIS_EMBEDDED_SHADERS="$PWD/$kernels" -DDERMIS_QUICK_OPTIMIZATION=-O0
 }
 
-step "install" ./cmake/install-deps.sh
+case $run in
+  all|sanitized) step "install" ./cmake/install-deps.sh sanitized ;;
+  *) step "install" ./cmake/install-deps.sh ;;
+esac
 outcome=0
 case $run in
   all)
