@@ -113,6 +113,7 @@ TEST_F(InexactTest, RandomCasesAreVerifiedWhereFmaRoundsOnce) {
   Inexact inexact(device().description(), fused);
   ASSERT_TRUE(inexact.context.ok());
   samples::VulkanTarget target(device(), *inexact.context);
+  const bool hasBounds = context().limits().maxStorageBuffersPerStage >= storageBuffersWanted;
   std::uint64_t compared = 0, exempt = 0;
   for (const Method method : allMethods) {
     for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
@@ -125,7 +126,7 @@ TEST_F(InexactTest, RandomCasesAreVerifiedWhereFmaRoundsOnce) {
         random.joints = 40;
         random.influences = influences;
         random.output.layout.tangents = VertexFormat::float32x4;
-        random.output.layout.bounds = influences % 2 == 0;
+        random.output.layout.bounds = hasBounds && influences % 2 == 0;
         const auto verified = samples::verifyRandomCase(target, random);
         ASSERT_TRUE(verified.ok()) << verified.error().message;
         for (const samples::VerifiedInstance& instance : *verified) {
