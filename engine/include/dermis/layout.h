@@ -56,28 +56,9 @@ inline constexpr std::array<VertexFormat, 10> allVertexFormats{
 
 /// Bytes of one element; 0 for `none`.
 constexpr std::uint32_t formatSize(VertexFormat format) {
-  switch (format) {
-    case VertexFormat::none:
-      break;
-    case VertexFormat::float32x3:
-      return 12;
-    case VertexFormat::float32x4:
-      return 16;
-    case VertexFormat::float16x3:
-    case VertexFormat::snorm16x3:
-      return 6;
-    case VertexFormat::float16x4:
-    case VertexFormat::snorm16x4:
-      return 8;
-    case VertexFormat::snorm8x3:
-      return 3;
-    case VertexFormat::snorm8x4:
-    case VertexFormat::octahedral16x2:
-      return 4;
-    case VertexFormat::octahedral8x2:
-      return 2;
-  }
-  return 0;
+  constexpr std::uint32_t sizes[] = {0, 12, 16, 6, 8, 6, 8, 3, 4, 4, 2};
+  const auto index = static_cast<std::size_t>(format);
+  return index < std::size(sizes) ? sizes[index] : 0;
 }
 
 /// Bytes of one component; 1 for `none`. For vertex input, the offset of an attribute must be a

@@ -110,21 +110,9 @@ enum class ComponentType : std::uint8_t {
 
 /// Bytes of one component.
 constexpr std::uint32_t componentSize(ComponentType type) {
-  switch (type) {
-    case ComponentType::snorm8:
-    case ComponentType::unorm8:
-    case ComponentType::uint8:
-      return 1;
-    case ComponentType::float16:
-    case ComponentType::snorm16:
-    case ComponentType::unorm16:
-    case ComponentType::uint16:
-      return 2;
-    case ComponentType::float32:
-    case ComponentType::uint32:
-      return 4;
-  }
-  return 0;
+  constexpr std::uint32_t sizes[] = {4, 2, 1, 2, 1, 2, 1, 2, 4};
+  const auto index = static_cast<std::size_t>(type);
+  return index < std::size(sizes) ? sizes[index] : 0;
 }
 
 /// One attribute: `count` elements of `components` components each, `stride` bytes apart. So it can

@@ -9,6 +9,9 @@
 
 namespace dermis {
 
+/// Fails unless `pack` takes the mesh for poses of `jointCount` joints.
+Result<void> checkPackable(const MeshView& mesh, std::uint32_t jointCount);
+
 /// Fails with `invalidMesh` unless there are vertices and the view of their positions is valid.
 Result<void> checkPositions(const MeshView& mesh);
 

@@ -1,29 +1,15 @@
 #include "dermis/layout.h"
 
+#include "text.h"
+
 namespace dermis {
 
 std::string_view methodName(Method method) {
-  switch (method) {
-    case Method::linear:
-      return "linear";
-    case Method::dualQuaternion:
-      return "dual_quaternion";
-    case Method::dualQuaternionIterative:
-      return "dual_quaternion_iterative";
-    case Method::logMatrix:
-      return "log_matrix";
-    case Method::sphericalBlend:
-      return "spherical_blend";
-    case Method::quaternionTranslation:
-      return "quaternion_translation";
-    case Method::blended:
-      return "blended";
-    case Method::centerOfRotation:
-      return "center_of_rotation";
-    case Method::bulgeControlled:
-      return "bulge_controlled";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"linear",     "dual_quaternion",    "dual_quaternion_iterative",
+                                   "log_matrix", "spherical_blend",    "quaternion_translation",
+                                   "blended",    "center_of_rotation", "bulge_controlled"};
+  static_assert(std::size(names) == std::size_t(Method::bulgeControlled) + 1);
+  return nameIn(names, method);
 }
 
 std::optional<Method> methodFromName(std::string_view name) {

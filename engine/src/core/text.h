@@ -26,4 +26,11 @@ DERMIS_CORE_API std::string decimal(double number);
 /// `shortName` in single quotation marks.
 DERMIS_CORE_API std::string inQuotes(std::string_view name);
 
+/// The name of an enumerator; enumerators count from 0. "unknown" for other values.
+template <typename Enum, std::size_t count>
+const char* nameIn(const char* const (&names)[count], Enum value) {
+  const auto index = static_cast<std::size_t>(value);
+  return index < count ? names[index] : "unknown";
+}
+
 }  // namespace dermis

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <tuple>
 
@@ -60,12 +59,6 @@ class Findings {
   std::array<MeshFinding, problemCount> findings_{};
   std::array<std::uint32_t, problemCount> lastVertex_{};
 };
-
-std::string inWords(double number) {
-  char digits[32];
-  std::snprintf(digits, sizeof(digits), "%.9g", number);
-  return digits;
-}
 
 constexpr const char* typeNames[] = {"float32", "float16", "snorm8", "snorm16", "unorm8",
                                      "unorm16", "uint8",   "uint16", "uint32"};
@@ -266,7 +259,7 @@ void checkLength(const AttributeView& view, MeshProblem problem, const char* nam
   const double length = std::sqrt(square);
   if (std::abs(length - 1) <= tolerance) return;
   findings.addVertex(problem, vertex, [&] {
-    return std::string("the ") + name + " has a length of " + inWords(length) + ", not 1";
+    return std::string("the ") + name + " has a length of " + decimal(length) + ", not 1";
   });
 }
 
@@ -279,7 +272,7 @@ void checkDirections(const MeshView& mesh, std::uint32_t vertex, Findings& findi
   const float sign = loadFloat(mesh.tangents, vertex, 3);
   if (sign == 1 || sign == -1) return;
   findings.addVertex(MeshProblem::tangentSign, vertex, [&] {
-    return "the handedness of the tangent is " + inWords(static_cast<double>(sign)) +
+    return "the handedness of the tangent is " + decimal(static_cast<double>(sign)) +
            ", not 1 or -1";
   });
 }
@@ -292,14 +285,14 @@ bool isShare(float share) {
 void checkShares(const AttributeView& view, float whole, const char* name, Findings& findings) {
   if (!view && !isShare(whole)) {
     findings.addView(MeshProblem::methodWeightOutOfRange, std::string("its ") + name + " is " +
-                                                              inWords(static_cast<double>(whole)) +
+                                                              decimal(static_cast<double>(whole)) +
                                                               ", not from 0 to 1");
   }
   for (std::uint32_t vertex = 0; view && vertex < view.count; ++vertex) {
     const float share = loadFloat(view, vertex, 0);
     if (isShare(share)) continue;
     findings.addVertex(MeshProblem::methodWeightOutOfRange, vertex, [&] {
-      return std::string("the ") + name + " is " + inWords(static_cast<double>(share)) +
+      return std::string("the ") + name + " is " + decimal(static_cast<double>(share)) +
              ", not from 0 to 1";
     });
   }
@@ -344,7 +337,7 @@ double allowedDeviation(const MeshView& mesh, std::uint32_t usedWeights) {
 /// "joint 31", as the mesh stores it.
 std::string jointText(const InfluenceSet& set, std::uint32_t vertex, std::uint32_t slot) {
   return "joint " + (isFloat32(set.joints.type)
-                         ? inWords(loadReal(set.joints, vertex, slot))
+                         ? decimal(loadReal(set.joints, vertex, slot))
                          : std::to_string(loadUnsigned(set.joints, vertex, slot)));
 }
 
@@ -409,7 +402,7 @@ void checkInfluences(const MeshView& mesh, std::uint32_t jointCount, std::uint32
   }
   if (good && std::abs(sum - 1) > allowedDeviation(mesh, usedWeights)) {
     findings.addVertex(MeshProblem::weightsNotNormalized, vertex,
-                       [&] { return "the weights sum to " + inWords(sum) + ", not to 1"; });
+                       [&] { return "the weights sum to " + decimal(sum) + ", not to 1"; });
   }
   std::sort(used.begin(), used.end());
   const auto twice = std::adjacent_find(used.begin(), used.end());
@@ -426,53 +419,30 @@ bool refusedByPack(MeshProblem problem) {
 }
 
 const char* meshProblemName(MeshProblem problem) {
-  switch (problem) {
-    case MeshProblem::emptyMesh:
-      return "empty mesh";
-    case MeshProblem::noInfluenceSets:
-      return "no joints and weights";
-    case MeshProblem::countMismatch:
-      return "counts differ";
-    case MeshProblem::strideTooSmall:
-      return "stride too small";
-    case MeshProblem::wrongFormat:
-      return "wrong format";
-    case MeshProblem::morphVertices:
-      return "wrong vertices of a morph target";
-    case MeshProblem::nonFinitePosition:
-      return "position not finite";
-    case MeshProblem::nonFiniteNormal:
-      return "normal not finite";
-    case MeshProblem::nonFiniteTangent:
-      return "tangent not finite";
-    case MeshProblem::nonFiniteMorph:
-      return "displacement not finite";
-    case MeshProblem::nonFiniteCenter:
-      return "center of rotation not finite";
-    case MeshProblem::methodWeightOutOfRange:
-      return "dual-quaternion weight or bulge strength out of range";
-    case MeshProblem::nonFiniteWeight:
-      return "weight not finite";
-    case MeshProblem::negativeWeight:
-      return "negative weight";
-    case MeshProblem::jointOutOfRange:
-      return "joint out of range";
-    case MeshProblem::weightsNotNormalized:
-      return "weights do not sum to 1";
-    case MeshProblem::duplicateJoint:
-      return "joint twice in a vertex";
-    case MeshProblem::vertexWithoutWeight:
-      return "vertex without weight";
-    case MeshProblem::unusedJointOutOfRange:
-      return "joint out of range, with weight 0";
-    case MeshProblem::normalLength:
-      return "normal not of unit length";
-    case MeshProblem::tangentLength:
-      return "tangent not of unit length";
-    case MeshProblem::tangentSign:
-      return "tangent without handedness";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"empty mesh",
+                                   "no joints and weights",
+                                   "counts differ",
+                                   "stride too small",
+                                   "wrong format",
+                                   "wrong vertices of a morph target",
+                                   "position not finite",
+                                   "normal not finite",
+                                   "tangent not finite",
+                                   "displacement not finite",
+                                   "center of rotation not finite",
+                                   "dual-quaternion weight or bulge strength out of range",
+                                   "weight not finite",
+                                   "negative weight",
+                                   "joint out of range",
+                                   "weights do not sum to 1",
+                                   "joint twice in a vertex",
+                                   "vertex without weight",
+                                   "joint out of range, with weight 0",
+                                   "normal not of unit length",
+                                   "tangent not of unit length",
+                                   "tangent without handedness"};
+  static_assert(std::size(names) == std::size_t(MeshProblem::tangentSign) + 1);
+  return nameIn(names, problem);
 }
 
 bool MeshReport::packable() const {
@@ -505,6 +475,15 @@ Result<void> checkPositions(const MeshView& mesh) {
   Findings findings(mesh.name);
   checkPositions(mesh, findings);
   return findings.take().accepted();
+}
+
+Result<void> checkPackable(const MeshView& mesh, std::uint32_t jointCount) {
+  if (jointCount == 0 || jointCount > maxPoseJoints) {
+    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": a pose has 1 to " +
+                                                 std::to_string(maxPoseJoints) + " joints, not " +
+                                                 std::to_string(jointCount)};
+  }
+  return validate(mesh, jointCount).accepted();
 }
 
 MeshReport validate(const MeshView& mesh, std::uint32_t jointCount) {

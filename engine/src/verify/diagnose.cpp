@@ -210,41 +210,24 @@ Result<void> checkInput(const MeshView& mesh, const PoseInput& input) {
 }  // namespace
 
 const char* poseMistakeName(PoseMistake mistake) {
-  switch (mistake) {
-    case PoseMistake::none:
-      return "none";
-    case PoseMistake::unknown:
-      return "unknown";
-    case PoseMistake::transposed:
-      return "transposed matrices";
-    case PoseMistake::columnMajor:
-      return "column-major floats";
-    case PoseMistake::inverseBindMissing:
-      return "inverse bind matrix missing";
-    case PoseMistake::inverseBindTwice:
-      return "inverse bind matrix twice";
-    case PoseMistake::inverseBindWrongSide:
-      return "inverse bind matrix on the wrong side";
-    case PoseMistake::jointsInNodeOrder:
-      return "joints in the order of nodes";
-    case PoseMistake::jointsSortedByName:
-      return "joints sorted by name";
-    case PoseMistake::jointsOffByOne:
-      return "joints off by one";
-    case PoseMistake::rootMissing:
-      return "root transform missing";
-    case PoseMistake::rootTwice:
-      return "root transform twice";
-    case PoseMistake::units:
-      return "units";
-    case PoseMistake::axes:
-      return "handedness or up axis";
-    case PoseMistake::quaternionOrder:
-      return "quaternion order";
-    case PoseMistake::weightSet:
-      return "weights of another set";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"none",
+                                   "unknown",
+                                   "transposed matrices",
+                                   "column-major floats",
+                                   "inverse bind matrix missing",
+                                   "inverse bind matrix twice",
+                                   "inverse bind matrix on the wrong side",
+                                   "joints in the order of nodes",
+                                   "joints sorted by name",
+                                   "joints off by one",
+                                   "root transform missing",
+                                   "root transform twice",
+                                   "units",
+                                   "handedness or up axis",
+                                   "quaternion order",
+                                   "weights of another set"};
+  static_assert(std::size(names) == std::size_t(PoseMistake::weightSet) + 1);
+  return nameIn(names, mistake);
 }
 
 Result<Diagnosis> diagnose(const MeshView& mesh, const PoseInput& input) {
