@@ -6,12 +6,13 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
-#include <utility>
 #include <vector>
 
 #include "attribute.h"
 #include "bounds/extent.h"
+#include "check_mesh.h"
 #include "dermis/mesh.h"
+#include "pack/influences.h"
 #include "strict_floating_point.h"
 #include "text.h"
 
@@ -21,10 +22,7 @@ namespace {
 using bounds::Range;
 using bounds::Reach;
 
-struct Influence {
-  std::uint32_t joint = 0;
-  double weight = 0;
-};
+using Influence = PackedInfluence;
 
 /// A component of a position or a displacement as it is stored.
 double loadStored(const AttributeView& view, std::uint32_t element, std::uint32_t component) {
@@ -41,43 +39,16 @@ math::Vec3 loadPosition(const MeshView& mesh, std::uint32_t vertex) {
   return position;
 }
 
-/// The joints that move a vertex, by ascending index, each once.
-void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
-                      std::vector<Influence>& influences) {
-  influences.clear();
-  for (const InfluenceSet& set : mesh.influenceSets) {
-    for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
-      const double weight = loadWeight(set.weights, vertex, slot);
-      if (weight != 0) influences.push_back({loadJoint(set.joints, vertex, slot), weight});
-    }
-  }
-  std::sort(influences.begin(), influences.end(),
-            [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
-  std::size_t kept = 0;
-  for (const Influence& influence : influences) {
-    if (kept > 0 && influences[kept - 1].joint == influence.joint) {
-      influences[kept - 1].weight += influence.weight;
-    } else {
-      influences[kept++] = influence;
-    }
-  }
-  influences.resize(kept);
-}
-
-Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
-  return {code, "mesh " + inQuotes(mesh.name) + what};
+Error invalid(const MeshView& mesh, const std::string& what) {
+  return {ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + what};
 }
 
 /// Where each vertex may be, relative to its bind position; empty if nothing displaces it.
 class Displacements {
  public:
-  Result<void> gather(const MeshView& mesh, std::span<const MorphRange> ranges) {
-    for (std::size_t target = 0; target < mesh.morphTargets.size(); ++target) {
-      const MorphRange range = ranges.empty() ? MorphRange{} : ranges[target];
-      const Result<void> added = add(mesh, target, range);
-      if (!added) return added.error();
-    }
-    return {};
+  Displacements(const MeshView& mesh, std::span<const MorphRange> ranges) {
+    for (std::size_t target = 0; target < mesh.morphTargets.size(); ++target)
+      add(mesh, mesh.morphTargets[target], ranges.empty() ? MorphRange{} : ranges[target]);
   }
 
   Range around(std::uint32_t vertex, const math::Vec3& position) const {
@@ -86,39 +57,20 @@ class Displacements {
   }
 
  private:
-  Result<void> add(const MeshView& mesh, std::size_t index, const MorphRange& range) {
-    const MorphTargetView& target = mesh.morphTargets[index];
-    if (!target.positions) return {};
-    const std::string name = ", morph target " + std::to_string(index);
-    const bool all = target.vertices.empty();
-    if (target.positions.count != (all ? mesh.vertexCount : target.vertices.size()) ||
-        target.positions.components < 3) {
-      return invalid(mesh, ErrorCode::invalidMesh,
-                     name + ": it has " + std::to_string(target.positions.count) +
-                         " positions of " + std::to_string(target.positions.components) +
-                         " components, but needs 3 components for each of its vertices");
-    }
+  void add(const MeshView& mesh, const MorphTargetView& target, const MorphRange& range) {
+    if (!target.positions) return;
     ranges_.resize(mesh.vertexCount, Range{math::Vec3(0.0), math::Vec3(0.0)});
     for (std::uint32_t element = 0; element < target.positions.count; ++element) {
-      const std::uint32_t vertex = all ? element : target.vertices[element];
+      const std::uint32_t vertex = target.vertices.empty() ? element : target.vertices[element];
       math::Vec3 whole;
       for (std::uint32_t i = 0; i < 3; ++i) {
         whole[static_cast<int>(i)] =
             loadStored(target.positions, element, i) * static_cast<double>(target.positionScale[i]);
       }
-      const char* fault = vertex >= mesh.vertexCount ? ": its vertex is outside the mesh"
-                          : !std::isfinite(whole.x + whole.y + whole.z)
-                              ? ": its displacement is not finite"
-                              : nullptr;
-      if (fault != nullptr) {
-        return invalid(mesh, ErrorCode::invalidMesh,
-                       name + ", element " + std::to_string(element) + fault);
-      }
       const math::Vec3 low = static_cast<double>(range.min) * whole;
       const math::Vec3 high = static_cast<double>(range.max) * whole;
       ranges_[vertex] = ranges_[vertex] + Range{math::min(low, high), math::max(low, high)};
     }
-    return {};
   }
 
   std::vector<Range> ranges_;
@@ -234,42 +186,31 @@ class Collector {
   Range unweighted_;
 };
 
-Result<void> checkArguments(const MeshView& mesh, std::uint32_t jointCount,
-                            std::span<const MorphRange> morphRanges) {
-  if (jointCount == 0 || jointCount > maxPoseJoints) {
-    return invalid(mesh, ErrorCode::invalidArgument,
-                   ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
-                       std::to_string(jointCount));
-  }
+Result<void> checkRanges(const MeshView& mesh, std::span<const MorphRange> morphRanges) {
   if (!morphRanges.empty() && morphRanges.size() != mesh.morphTargets.size()) {
-    return invalid(mesh, ErrorCode::invalidArgument,
-                   ": there are " + std::to_string(morphRanges.size()) + " ranges for " +
-                       std::to_string(mesh.morphTargets.size()) + " morph targets");
+    return invalid(mesh, ": there are " + std::to_string(morphRanges.size()) + " ranges for " +
+                             std::to_string(mesh.morphTargets.size()) + " morph targets");
   }
   for (const MorphRange& range : morphRanges) {
     if (!std::isfinite(range.min) || !std::isfinite(range.max) || range.min > range.max) {
-      return invalid(mesh, ErrorCode::invalidArgument,
-                     ": a range of morph weights is not finite, or its min is above its max");
+      return invalid(mesh, ": a range of morph weights is not finite, or its min is above its max");
     }
   }
-  return validate(mesh, jointCount).accepted();
+  return {};
 }
 
 }  // namespace
 
 Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
                                 std::span<const MorphRange> morphRanges) {
-  if (const Result<void> good = checkArguments(mesh, jointCount, morphRanges); !good) {
-    return good.error();
-  }
-  Displacements displacements;
-  if (const Result<void> good = displacements.gather(mesh, morphRanges); !good) {
-    return good.error();
-  }
+  if (const Result<void> good = checkRanges(mesh, morphRanges); !good) return good.error();
+  if (const Result<void> good = checkPackable(mesh, jointCount); !good) return good.error();
+  const Displacements displacements(mesh, morphRanges);
   Collector collector(jointCount);
   std::vector<Influence> influences;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     gatherInfluences(mesh, vertex, influences);
+    mergeJoints(influences);
     collector.add(influences, displacements.around(vertex, loadPosition(mesh, vertex)));
   }
   return JointBoundsData::joined(collector.take());

@@ -71,17 +71,7 @@ void meanInfluences(const Vertices& vertices, Corners corners, std::vector<Influ
     const std::span<const Influence> influences = vertices.influences[corner];
     mean.insert(mean.end(), influences.begin(), influences.end());
   }
-  std::sort(mean.begin(), mean.end(),
-            [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
-  std::size_t kept = 0;
-  for (const Influence& influence : mean) {
-    if (kept > 0 && mean[kept - 1].joint == influence.joint) {
-      mean[kept - 1].weight += influence.weight;
-    } else {
-      mean[kept++] = influence;
-    }
-  }
-  mean.resize(kept);
+  mergeJoints(mean);
   for (Influence& influence : mean) influence.weight /= 3;
 }
 
@@ -136,16 +126,11 @@ std::vector<Group> group(const Triangles& triangles) {
 /// The mesh must be one that `pack` takes.
 Vertices gatherVertices(const MeshView& mesh) {
   Vertices vertices;
-  std::vector<PackedInfluence> packed;
   std::vector<Influence> influences;
   for (std::uint32_t vertex = 0; vertex < mesh.vertexCount; ++vertex) {
     vertices.positions.emplace_back(loadPosition(mesh, vertex, 0), loadPosition(mesh, vertex, 1),
                                     loadPosition(mesh, vertex, 2));
-    packInfluences(mesh, vertex, packed);
-    influences.clear();
-    for (const PackedInfluence& influence : packed) {
-      influences.push_back({influence.joint, influence.weight});
-    }
+    packInfluences(mesh, vertex, influences);
     vertices.influences.add(influences);
   }
   return vertices;
@@ -169,21 +154,12 @@ using centers::Moment;
 using centers::PairIndex;
 using centers::Vertices;
 
-Error invalid(const MeshView& mesh, ErrorCode code, const std::string& what) {
-  return {code, "mesh " + inQuotes(mesh.name) + what};
-}
-
 Result<void> check(const MeshView& mesh, std::uint32_t jointCount,
                    std::span<const std::uint32_t> triangles) {
-  if (jointCount == 0 || jointCount > maxPoseJoints) {
-    return invalid(mesh, ErrorCode::invalidArgument,
-                   ": a pose has 1 to " + std::to_string(maxPoseJoints) + " joints, not " +
-                       std::to_string(jointCount));
-  }
   // Centers that the mesh already has are ignored, valid or not.
   MeshView bare = mesh;
   bare.centersOfRotation = {};
-  if (Result<void> accepted = validate(bare, jointCount).accepted(); !accepted) return accepted;
+  if (Result<void> good = checkPackable(bare, jointCount); !good) return good;
   return checkTriangles(mesh, triangles);
 }
 

@@ -8,14 +8,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dermis/mesh.h"
+#include "pack/influences.h"
 
 namespace dermis::centers {
 
-struct Influence {
-  std::uint32_t joint = 0;
-  double weight = 0;
-};
+using Influence = PackedInfluence;
 
 /// Σ weight · (centroid, 1). (x, y, z) / sum is a center.
 struct Moment {

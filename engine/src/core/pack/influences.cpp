@@ -7,10 +7,9 @@
 #include "strict_floating_point.h"
 
 namespace dermis {
-namespace {
 
-/// The same order everywhere makes results equal to the bit.
-void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInfluence>& influences) {
+void gatherInfluences(const MeshView& mesh, std::uint32_t vertex,
+                      std::vector<PackedInfluence>& influences) {
   influences.clear();
   for (const InfluenceSet& set : mesh.influenceSets) {
     for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
@@ -18,6 +17,9 @@ void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInflue
       if (weight != 0) influences.push_back({loadJoint(set.joints, vertex, slot), weight});
     }
   }
+}
+
+void mergeJoints(std::vector<PackedInfluence>& influences) {
   // Also by weight: the order in which duplicates are added must not depend on their slots.
   std::sort(influences.begin(), influences.end(),
             [](const PackedInfluence& a, const PackedInfluence& b) {
@@ -31,12 +33,10 @@ void gather(const MeshView& mesh, std::uint32_t vertex, std::vector<PackedInflue
       influences[kept++] = influence;
     }
   }
-  influences.resize(kept, PackedInfluence{});
-  std::sort(influences.begin(), influences.end(),
-            [](const PackedInfluence& a, const PackedInfluence& b) {
-              return a.weight != b.weight ? a.weight > b.weight : a.joint < b.joint;
-            });
+  influences.resize(kept);
 }
+
+namespace {
 
 /// The nearest float32 that also is a multiple of 2^-48: sums of such weights are exact in double.
 double quantize(double weight) {
@@ -73,7 +73,12 @@ void normalize(std::vector<PackedInfluence>& influences) {
 
 void packInfluences(const MeshView& mesh, std::uint32_t vertex,
                     std::vector<PackedInfluence>& influences) {
-  gather(mesh, vertex, influences);
+  gatherInfluences(mesh, vertex, influences);
+  mergeJoints(influences);
+  std::sort(influences.begin(), influences.end(),
+            [](const PackedInfluence& a, const PackedInfluence& b) {
+              return a.weight != b.weight ? a.weight > b.weight : a.joint < b.joint;
+            });
   if (!influences.empty()) normalize(influences);
 }
 
