@@ -12,9 +12,9 @@
 #include "dermis/verify.h"
 #include "made_rig.h"
 #include "matrix_of.h"
-#include "pack/check.h"
 #include "random_number.h"
 #include "rig/blob.h"
+#include "stored.h"
 
 namespace dermis::test {
 namespace {
@@ -350,7 +350,7 @@ TEST(RigBytes, ADamagedWordIsFoundOrHarmless) {
       words[word] = value;
       EXPECT_FALSE(read(words).ok()) << "word " << word;
       if (word == 2) continue;  // the checksum
-      words[2] = checksumOfBlob(words);
+      words[2] = checksumOf(words);
       const Result<PackedRig> rig = read(words);
       if (!rig) {
         ++refused;
@@ -379,8 +379,7 @@ std::vector<std::uint32_t> withIdleChains(const PackedRig& rig, std::uint32_t co
   for (std::uint32_t i = 0; i < count; ++i) words.insert(words.end(), {abi::RIG_CHAIN, node, 1, 0});
   words[offsetof(RigHeader, drivers) / 4] = drivers;
   words[offsetof(RigHeader, driverCount) / 4] = header.driverCount + count;
-  words[offsetof(RigHeader, wordCount) / 4] = static_cast<std::uint32_t>(words.size());
-  words[offsetof(RigHeader, checksum) / 4] = checksumOfBlob(words);
+  finishStored(words);
   return words;
 }
 

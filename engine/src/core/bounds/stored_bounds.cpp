@@ -12,7 +12,7 @@
 
 #include "bounds/joint_bounds_data.h"
 #include "dermis/mesh.h"
-#include "pack/check.h"
+#include "stored.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
@@ -21,8 +21,6 @@ namespace {
 constexpr std::uint32_t magic = 0x42425344u;  // "DSBB"
 constexpr std::uint32_t version = 1;
 
-/// The first four words are those of a packed mesh header, so that the checksum is computed in the
-/// same way.
 struct Header {
   std::uint32_t magic, version, checksum, wordCount;
   std::uint32_t joints, pairs, trios, requiredJoints;
@@ -36,9 +34,7 @@ constexpr std::uint64_t wordsOf(std::uint64_t joints, std::uint64_t pairs, std::
          pairs * sizeof(JointBoundsData::Pair) / 4 + trios * 3;
 }
 
-Error damagedBounds(const std::string& what) {
-  return {ErrorCode::invalidData, "joint bounds: " + what};
-}
+constexpr StoredKind storedBounds{"joint bounds", magic, version, sizeof(Header) / 4};
 
 bool hasNan(std::span<const float> numbers) {
   return std::ranges::any_of(numbers, [](float number) { return std::isnan(number); });
@@ -64,12 +60,12 @@ Result<void> checkJoints(const JointBoundsData& bounds) {
   std::uint32_t required = 0;
   for (const JointBoundsData::Joint& joint : bounds.joints) {
     if (joint.joint < required || joint.joint >= maxPoseJoints || hasNan(joint.alone.reach))
-      return damagedBounds("its joints are not in ascending order, or contain NaN");
+      return storedBounds.damaged("its joints are not in ascending order, or contain NaN");
     required = joint.joint + 1;
   }
   if (required != bounds.requiredJoints) {
-    return damagedBounds("requiredJoints is " + std::to_string(bounds.requiredJoints) + ", not " +
-                         std::to_string(required));
+    return storedBounds.damaged("requiredJoints is " + std::to_string(bounds.requiredJoints) +
+                                ", not " + std::to_string(required));
   }
   return {};
 }
@@ -83,7 +79,7 @@ Result<void> checkPairs(const JointBoundsData& bounds) {
     if (pair.first >= pair.second || pair.second >= bounds.joints.size() || key < next ||
         pair.influences < 2 || hasNan(pair.extent.reach) || hasNan(ratios) ||
         std::ranges::any_of(ratios, [](float ratio) { return ratio < 0; }))
-      return damagedBounds(
+      return storedBounds.damaged(
           "its pairs of joints are not in ascending order, or contain values that are not valid");
     next = key + 1;
   }
@@ -95,7 +91,7 @@ Result<void> checkTrios(const JointBoundsData& bounds) {
   for (const std::array<std::uint32_t, 3>& trio : bounds.trios) {
     if (trio[0] >= trio[1] || trio[1] >= trio[2] || trio[2] >= bounds.joints.size() ||
         (before != nullptr && !(*before < trio)))
-      return damagedBounds("its trios of joints are not in ascending order");
+      return storedBounds.damaged("its trios of joints are not in ascending order");
     before = &trio;
   }
   return {};
@@ -105,47 +101,34 @@ Result<void> checkTrios(const JointBoundsData& bounds) {
 
 std::vector<std::byte> JointBoundsData::bytes() const {
   static_assert(std::endian::native == std::endian::little, "the words are little-endian");
-  const std::uint64_t words = wordsOf(joints.size(), pairs.size(), trios.size());
-  std::vector<std::byte> bytes(static_cast<std::size_t>(4 * words));
-  std::span<std::byte> rest = std::span(bytes).subspan(sizeof(Header));
+  const Header header{magic,
+                      version,
+                      0,
+                      0,
+                      static_cast<std::uint32_t>(joints.size()),
+                      static_cast<std::uint32_t>(pairs.size()),
+                      static_cast<std::uint32_t>(trios.size()),
+                      requiredJoints,
+                      unweighted};
+  std::vector<std::uint32_t> words(
+      static_cast<std::size_t>(wordsOf(joints.size(), pairs.size(), trios.size())));
+  std::memcpy(words.data(), &header, sizeof(header));
+  std::span<std::byte> rest = std::as_writable_bytes(std::span(words)).subspan(sizeof(header));
   put(rest, joints);
   put(rest, pairs);
   put(rest, trios);
-  Header header{magic,
-                version,
-                0,
-                static_cast<std::uint32_t>(words),
-                static_cast<std::uint32_t>(joints.size()),
-                static_cast<std::uint32_t>(pairs.size()),
-                static_cast<std::uint32_t>(trios.size()),
-                requiredJoints,
-                unweighted};
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  std::vector<std::uint32_t> blob(bytes.size() / 4);
-  std::memcpy(blob.data(), bytes.data(), bytes.size());
-  header.checksum = checksumOfBlob(blob);
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  return bytes;
+  finishStored(words);
+  const std::span<const std::byte> bytes = std::as_bytes(std::span(words));
+  return {bytes.begin(), bytes.end()};
 }
 
 Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> bytes) {
-  Header header{};
-  if (bytes.size() >= sizeof(header)) std::memcpy(&header, bytes.data(), sizeof(header));
-  if (header.magic != magic)
-    return damagedBounds("the bytes do not begin with the header of joint bounds");
-  if (header.version != version) {
-    return Error{ErrorCode::unsupportedVersion,
-                 "joint bounds: version " + std::to_string(header.version) +
-                     ", but this library reads version " + std::to_string(version)};
-  }
-  if (std::uint64_t{header.wordCount} * 4 != bytes.size() ||
-      wordsOf(header.joints, header.pairs, header.trios) != header.wordCount) {
-    return damagedBounds("they have " + std::to_string(bytes.size()) +
-                         " bytes, but their header does not describe as many");
-  }
-  std::vector<std::uint32_t> words(header.wordCount);
-  std::memcpy(words.data(), bytes.data(), bytes.size());
-  if (checksumOfBlob(words) != header.checksum) return damagedBounds("the checksum does not match");
+  const Result<std::vector<std::uint32_t>> words = storedBounds.wordsOf(bytes);
+  if (!words) return words.error();
+  Header header;
+  std::memcpy(static_cast<void*>(&header), words->data(), sizeof(header));
+  if (wordsOf(header.joints, header.pairs, header.trios) != header.wordCount)
+    return storedBounds.damaged("its header does not describe as many bytes");
 
   JointBoundsData bounds;
   bytes = bytes.subspan(sizeof(header));
@@ -155,7 +138,7 @@ Result<JointBoundsData> JointBoundsData::fromBytes(std::span<const std::byte> by
   bounds.unweighted = header.unweighted;
   bounds.requiredJoints = header.requiredJoints;
   if (hasNan(bounds.unweighted.min) || hasNan(bounds.unweighted.max))
-    return damagedBounds("the box of vertices without weight contains NaN");
+    return storedBounds.damaged("the box of vertices without weight contains NaN");
   if (Result<void> good = checkJoints(bounds); !good) return good.error();
   if (Result<void> good = checkPairs(bounds); !good) return good.error();
   if (Result<void> good = checkTrios(bounds); !good) return good.error();

@@ -10,15 +10,13 @@
 
 #include "clips/errors.h"
 #include "dermis/clips.h"
-#include "pack/check.h"
+#include "stored.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
 namespace {
 
-Error damagedBank(const std::string& what) {
-  return {ErrorCode::invalidData, "packed clips: " + what};
-}
+constexpr StoredKind storedClips{"packed clips", clipsMagic, clipsVersion, sizeof(BankHeader) / 4};
 
 class BankCheck {
  public:
@@ -35,20 +33,22 @@ class BankCheck {
         (header.motion != 0 && !isMotion(header.motion)) || header.clipCount > maxClips ||
         header.maskCount > maxMasks || header.nodes % 4 != 0 || header.clips % 4 != 0 ||
         header.groupCount > total_)
-      return damagedBank("its header does not fit its sections");
+      return storedClips.damaged("its header does not fit its sections");
     for (std::size_t i = 0; i < nodes; ++i) {
-      if (!isNode(i)) return damagedBank("node " + std::to_string(i) + " is not valid");
+      if (!isNode(i)) return storedClips.damaged("node " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.skinCount; ++i) {
-      if (!isSkin(bank_.skin(i))) return damagedBank("skin " + std::to_string(i) + " is not valid");
+      if (!isSkin(bank_.skin(i)))
+        return storedClips.damaged("skin " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.morphedCount; ++i) {
       if (!isMorphed(bank_.morphed(i)) ||
           (i > 0 && bank_.morphed(i).source <= bank_.morphed(i - 1).source))
-        return damagedBank("node with weights " + std::to_string(i) + " is not valid");
+        return storedClips.damaged("node with weights " + std::to_string(i) + " is not valid");
     }
     for (std::size_t i = 0; i < header.clipCount; ++i) {
-      if (!isClip(bank_.clip(i))) return damagedBank("clip " + std::to_string(i) + " is not valid");
+      if (!isClip(bank_.clip(i)))
+        return storedClips.damaged("clip " + std::to_string(i) + " is not valid");
     }
     return {};
   }
@@ -165,31 +165,15 @@ class BankCheck {
 }  // namespace
 
 Result<void> checkClips(std::span<const std::uint32_t> words) {
-  if (words.size() < sizeof(BankHeader) / 4 || words[0] != clipsMagic)
-    return damagedBank("the bytes do not begin with the header of packed clips");
-  const BankHeader header = ClipBank(words).header;
-  if (header.version != clipsVersion) {
-    return Error{ErrorCode::unsupportedVersion,
-                 "packed clips: version " + std::to_string(header.version) +
-                     ", but this library reads version " + std::to_string(clipsVersion)};
-  }
-  if (header.wordCount != words.size()) {
-    return damagedBank("they have " + std::to_string(words.size() * 4) +
-                       " bytes, but their header says " +
-                       std::to_string(std::uint64_t{header.wordCount} * 4));
-  }
-  if (checksumOfBlob(words) != header.checksum) return damagedBank("the checksum does not match");
   return BankCheck(words).run();
 }
 
 Result<PackedClips> PackedClips::fromBytes(std::span<const std::byte> bytes) {
+  Result<std::vector<std::uint32_t>> words = storedClips.wordsOf(bytes);
+  if (!words) return words.error();
+  if (Result<void> good = checkClips(*words); !good) return good.error();
   PackedClips clips;
-  clips.words_.resize(bytes.size() / 4);
-  if (!clips.words_.empty())
-    std::memcpy(clips.words_.data(), bytes.data(), clips.words_.size() * 4);
-  if (bytes.size() % 4 != 0)
-    return damagedBank("they have " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
-  if (Result<void> good = checkClips(clips.words_); !good) return good.error();
+  clips.words_ = *std::move(words);
   return clips;
 }
 

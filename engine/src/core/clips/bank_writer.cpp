@@ -57,10 +57,8 @@ class BankWriter {
       if (words_.size() > 0x3fffffff)
         return Error{ErrorCode::limitExceeded, "packClips: the clips need more than 4 GiB"};
     }
-    header.wordCount = static_cast<std::uint32_t>(words_.size());
     put(0, header);
-    header.checksum = checksumOfBlob(words_);
-    put(0, header);
+    finishStored(words_);
     report.byteCount = words_.size() * 4;
     return std::move(words_);
   }

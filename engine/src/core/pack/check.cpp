@@ -32,20 +32,20 @@ Result<void> checkInfluences(std::span<const std::uint32_t> words, const abi::Me
     const std::uint64_t count = std::uint64_t{next / 2 - first / 2} * 2 - isOdd;
     if (next / 2 < first / 2 + isOdd || count > header.maxInfluences ||
         count < header.minInfluences) {
-      return damagedBlob("the influences of vertex " + std::to_string(vertex) +
-                         " do not follow those of the vertex before it");
+      return storedMesh.damaged("the influences of vertex " + std::to_string(vertex) +
+                                " do not follow those of the vertex before it");
     }
   }
   const std::uint64_t count = begin(vertices);
-  if (count % 2 != 0) return damagedBlob("the number of its influences is odd");
+  if (count % 2 != 0) return storedMesh.damaged("the number of its influences is odd");
   if (offset % 4 != 0 || !isSection(offset, count * abi::INFLUENCE_WORDS, words.size())) {
-    return damagedBlob("its influences lie outside the blob");
+    return storedMesh.damaged("its influences lie outside the blob");
   }
   for (std::uint64_t influence = 0; influence < count; ++influence) {
     const std::size_t record = static_cast<std::size_t>(offset + influence * abi::INFLUENCE_WORDS);
     if (abi::load<abi::InfluenceRecord>(words, record).joint >= header.requiredJoints) {
-      return damagedBlob("influence " + std::to_string(influence) +
-                         " has a joint index above its largest");
+      return storedMesh.damaged("influence " + std::to_string(influence) +
+                                " has a joint index above its largest");
     }
   }
   return {};
@@ -64,10 +64,11 @@ Result<void> checkMorph(std::span<const std::uint32_t> words, const abi::MeshHea
       (std::uint64_t{vertices} + abi::MORPH_BLOCK_VERTICES - 1) / abi::MORPH_BLOCK_VERTICES;
   if (morph.firstBlock + blockCount > allBlocks || morph.attributes > 7 ||
       !isUnitSection(morph.blocks, blockCount, words.size())) {
-    return damagedBlob("morph target " + std::to_string(target) + " lies outside the blob");
+    return storedMesh.damaged("morph target " + std::to_string(target) + " lies outside the blob");
   }
   if (morph.blocks < behind)
-    return damagedBlob("morph target " + std::to_string(target) + " overlaps the one before");
+    return storedMesh.damaged("morph target " + std::to_string(target) +
+                              " overlaps the one before");
   behind = morph.blocks + blockCount * abi::MORPH_BLOCK_WORDS;
   const std::uint64_t displacementWords =
       std::uint64_t{3} * static_cast<std::uint32_t>(std::popcount(morph.attributes));
@@ -78,8 +79,8 @@ Result<void> checkMorph(std::span<const std::uint32_t> words, const abi::MeshHea
                                     static_cast<std::uint64_t>(std::popcount(block.maskHigh));
     if (displaced != 0 &&
         !isSection(block.displacements, displaced * displacementWords, words.size())) {
-      return damagedBlob("displacements of morph target " + std::to_string(target) +
-                         " lie outside the blob");
+      return storedMesh.damaged("displacements of morph target " + std::to_string(target) +
+                                " lie outside the blob");
     }
   }
   return {};
@@ -87,33 +88,8 @@ Result<void> checkMorph(std::span<const std::uint32_t> words, const abi::MeshHea
 
 }  // namespace
 
-std::uint32_t checksumOfBlob(std::span<const std::uint32_t> words) {
-  std::uint32_t hash = 2166136261u;
-  for (const std::uint32_t word : words.subspan(offsetof(abi::MeshHeader, checksum) / 4 + 1))
-    hash = std::rotl((hash ^ word) * 16777619u, 15);
-  return hash;
-}
-
-Error damagedBlob(const std::string& what) {
-  return {ErrorCode::invalidData, "packed mesh: " + what};
-}
-
-Result<void> checkBlob(std::span<const std::uint32_t> words) {
-  if (words.size() < abi::MESH_HEADER_WORDS || words[0] != abi::MESH_MAGIC)
-    return damagedBlob("the bytes do not begin with the header of a packed mesh");
+Result<void> checkMeshWords(std::span<const std::uint32_t> words) {
   const auto header = abi::load<abi::MeshHeader>(words, 0);
-  if (header.version != abi::MESH_VERSION) {
-    return Error{ErrorCode::unsupportedVersion,
-                 "packed mesh: version " + std::to_string(header.version) +
-                     ", but this library reads version " + std::to_string(abi::MESH_VERSION)};
-  }
-  if (header.wordCount != words.size()) {
-    return damagedBlob("it has " + std::to_string(words.size() * 4) +
-                       " bytes, but its header says " +
-                       std::to_string(std::uint64_t{header.wordCount} * 4));
-  }
-  if (checksumOfBlob(words) != header.checksum) return damagedBlob("the checksum does not match");
-
   const std::uint64_t vertices = header.vertexCount;
   const auto areVectors = [&](std::uint32_t offset) {
     return offset == 0 || isUnitSection(offset, vertices, words.size());
@@ -126,7 +102,7 @@ Result<void> checkBlob(std::span<const std::uint32_t> words) {
       !areVectors(header.tangents) || !areVectors(header.centers) ||
       !areFloats(header.dualQuaternionWeights) || !areFloats(header.bulgeStrengths) ||
       !isUnitSection(header.morphs, header.morphCount, words.size())) {
-    return damagedBlob("its header does not fit its sections");
+    return storedMesh.damaged("its header does not fit its sections");
   }
   if (Result<void> good = checkInfluences(words, header); !good) return good;
   std::uint64_t behind = 0;

@@ -3,20 +3,17 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 
+#include "abi.h"
 #include "dermis/result.h"
+#include "stored.h"
 
 namespace dermis {
 
-/// Checksum of all words after the checksum itself: the step of FNV-1a, rotated by 15 bits, since
-/// multiplication carries changes upwards only. Each step is a bijection, so any single damaged
-/// word is detected.
-std::uint32_t checksumOfBlob(std::span<const std::uint32_t> words);
+inline constexpr StoredKind storedMesh{"packed mesh", abi::MESH_MAGIC, abi::MESH_VERSION,
+                                       abi::MESH_HEADER_WORDS};
 
-Error damagedBlob(const std::string& what);
-
-/// Checks the length, the version, the checksum, and every offset, count and index. O(words).
-Result<void> checkBlob(std::span<const std::uint32_t> words);
+/// Checks every offset, count and index of words that are `storedMesh`. O(words).
+Result<void> checkMeshWords(std::span<const std::uint32_t> words);
 
 }  // namespace dermis

@@ -8,6 +8,7 @@
 
 #include "abi.h"
 #include "attribute.h"
+#include "check_mesh.h"
 #include "pack/check.h"
 #include "pack/influences.h"
 #include "strict_floating_point.h"
@@ -229,13 +230,7 @@ std::uint64_t wordsNeeded(const MeshView& mesh) {
 }  // namespace
 
 Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
-  if (jointCount == 0 || jointCount > maxPoseJoints) {
-    return Error{ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + ": a pose has 1 to " +
-                                                 std::to_string(maxPoseJoints) + " joints, not " +
-                                                 std::to_string(jointCount)};
-  }
-  if (const Result<void> accepted = validate(mesh, jointCount).accepted(); !accepted)
-    return accepted.error();
+  if (const Result<void> good = checkPackable(mesh, jointCount); !good) return good.error();
 
   if (wordsNeeded(mesh) > mostWords) {
     return Error{ErrorCode::limitExceeded,
@@ -262,22 +257,21 @@ Result<PackedMesh> pack(const MeshView& mesh, std::uint32_t jointCount) {
   header.morphCount = static_cast<std::uint32_t>(mesh.morphTargets.size());
   while (words.size() % (packedMeshAlignment / 4) != 0) words.push_back(0);
 
-  header.wordCount = offsetOf(words);
   abi::store(words, 0, header);
-  header.checksum = checksumOfBlob(words);
-  abi::store(words, 0, header);
+  finishStored(words);
   return packed;
 }
 
 Result<PackedMesh> PackedMesh::fromBytes(std::span<const std::byte> bytes) {
   if (bytes.size() % packedMeshAlignment != 0) {
-    return damagedBlob("its length of " + std::to_string(bytes.size()) +
-                       " bytes is not a multiple of " + std::to_string(packedMeshAlignment));
+    return storedMesh.damaged("its length of " + std::to_string(bytes.size()) +
+                              " bytes is not a multiple of " + std::to_string(packedMeshAlignment));
   }
+  Result<std::vector<std::uint32_t>> words = storedMesh.wordsOf(bytes);
+  if (!words) return words.error();
+  if (const Result<void> good = checkMeshWords(*words); !good) return good.error();
   PackedMesh packed;
-  packed.words_.resize(bytes.size() / 4);
-  if (!bytes.empty()) std::memcpy(packed.words_.data(), bytes.data(), bytes.size());
-  if (const Result<void> good = checkBlob(packed.words_); !good) return good.error();
+  packed.words_ = *std::move(words);
   return packed;
 }
 

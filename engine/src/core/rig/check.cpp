@@ -6,16 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "pack/check.h"
 #include "rig/blob.h"
+#include "stored.h"
 #include "strict_floating_point.h"
 
 namespace dermis {
 namespace {
 
-Error damagedRig(const std::string& what) {
-  return {ErrorCode::invalidData, "packed rig: " + what};
-}
+constexpr StoredKind storedRig{"packed rig", rigMagic, rigVersion, sizeof(RigHeader) / 4};
 
 /// Goes through the drivers in their order.
 class RigCheck {
@@ -36,14 +34,14 @@ class RigCheck {
     const RigHeader& header = rig_.header;
     if (!isSection(header.drivers, header.driverCount, abi::RIG_DRIVER_WORDS) ||
         !std::isfinite(header.residual))
-      return damagedRig("its header does not fit its drivers");
+      return storedRig.damaged("its header does not fit its drivers");
     for (std::size_t i = 0; i < header.driverCount; ++i) {
       if (!isDriver(rig_.driver(i)))
-        return damagedRig("driver " + std::to_string(i) + " is not valid");
+        return storedRig.damaged("driver " + std::to_string(i) + " is not valid");
     }
     for (const std::vector<bool>* made : {&isDriven_, &isWeighed_}) {
       if (std::ranges::find(*made, false) != made->end())
-        return damagedRig("a joint or a weight has no driver");
+        return storedRig.damaged("a joint or a weight has no driver");
     }
     return {};
   }
@@ -191,33 +189,18 @@ class RigCheck {
 }  // namespace
 
 Result<void> checkRig(std::span<const std::uint32_t> words) {
-  if (words.size() < sizeof(RigHeader) / 4 || words[0] != rigMagic)
-    return damagedRig("it does not begin as a rig does");
   const RigHeader header = RigBlob(words).header;
-  if (header.version != rigVersion) {
-    return Error{ErrorCode::unsupportedVersion,
-                 "packed rig: version " + std::to_string(header.version) +
-                     ", but this library reads version " + std::to_string(rigVersion)};
-  }
-  if (header.wordCount != words.size()) {
-    return damagedRig("it has " + std::to_string(words.size() * 4) +
-                      " bytes, but its header says " +
-                      std::to_string(std::uint64_t{header.wordCount} * 4));
-  }
-  if (checksumOfBlob(words) != header.checksum) return damagedRig("the checksum does not match");
-  if (!RigCheck::isSmall(header)) return damagedRig("its header has counts that are not valid");
-  if (header.mostInputs > header.wordCount)
-    return damagedRig("its header has counts that are not valid");
+  if (!RigCheck::isSmall(header) || header.mostInputs > header.wordCount)
+    return storedRig.damaged("its header has counts that are not valid");
   return RigCheck(words).run();
 }
 
 Result<PackedRig> PackedRig::fromBytes(std::span<const std::byte> bytes) {
-  if (bytes.size() % 4 != 0)
-    return damagedRig("it has " + std::to_string(bytes.size()) + " bytes, no multiple of 4");
+  Result<std::vector<std::uint32_t>> words = storedRig.wordsOf(bytes);
+  if (!words) return words.error();
+  if (Result<void> good = checkRig(*words); !good) return good.error();
   PackedRig rig;
-  rig.words_.resize(bytes.size() / 4);
-  if (!rig.words_.empty()) std::memcpy(rig.words_.data(), bytes.data(), bytes.size());
-  if (Result<void> good = checkRig(rig.words_); !good) return good.error();
+  rig.words_ = *std::move(words);
   return rig;
 }
 

@@ -133,10 +133,8 @@ class RigPacker {
       header.mostInputs =
           std::max(header.mostInputs, static_cast<std::uint32_t>(corrective.inputs.size()));
     }
-    header.wordCount = static_cast<std::uint32_t>(words_.size());
     put(0, header);
-    header.checksum = checksumOfBlob(words_);
-    put(0, header);
+    finishStored(words_);
     return std::move(words_);
   }
 
