@@ -5,15 +5,6 @@
 #include "abi.h"
 #include "exact.glsl"
 
-#ifdef ONE_OUTPUT
-
-// There is no results buffer, and no plan has results.
-void clearResult(uint result) {}
-void addToBounds(uint result, vec3 position) {}
-void countClamped(uint result) {}
-
-#else
-
 #ifndef RESULTS_BINDING
 #define RESULTS_BINDING BINDING_RESULTS
 #endif
@@ -69,7 +60,5 @@ void addToBounds(uint result, vec3 position) {
 }
 
 void countClamped(uint result) { atomicAdd(results[result].clampedVertices, 1u); }
-
-#endif
 
 #endif

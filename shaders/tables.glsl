@@ -20,21 +20,21 @@ layout(set = 0, binding = BINDING_TABLES, std430) TABLE_ACCESS buffer TableUnits
 uvec4 tableUnit(uint word) { return tableUnits[word / 4u]; }
 #endif
 
-PaletteRecord loadPalette(uint word) {
-  uvec4 a = tableUnit(word);
-  return PaletteRecord(a.x, a.y, a.z, a.w);
-}
-
-DrivenRecord loadDriven(uint word) {
-  uvec4 a = tableUnit(word);
-  return DrivenRecord(a.x, a.y, a.z, a.w);
-}
-
-RigRecord loadRig(uint word) {
-  uvec4 a = tableUnit(word);
-  uvec4 b = tableUnit(word + 4u);
-  return RigRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
-}
+// A record of four words, and one of eight.
+#define LOAD_FOUR(load, Record)                            \
+  Record load(uint word) {                                 \
+    uvec4 a = tableUnit(word);                             \
+    return Record(a.x, a.y, a.z, a.w);                     \
+  }
+#define LOAD_EIGHT(load, Record)                           \
+  Record load(uint word) {                                 \
+    uvec4 a = tableUnit(word);                             \
+    uvec4 b = tableUnit(word + 4u);                        \
+    return Record(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w); \
+  }
+LOAD_FOUR(loadPalette, PaletteRecord)
+LOAD_FOUR(loadDriven, DrivenRecord)
+LOAD_EIGHT(loadRig, RigRecord)
 
 GroupRecord loadGroup(uint word) {
   uvec4 a = tableUnit(word);
@@ -43,21 +43,9 @@ GroupRecord loadGroup(uint word) {
   return GroupRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w);
 }
 
-BankRecord loadBank(uint word) {
-  uvec4 a = tableUnit(word);
-  return BankRecord(a.x, a.y, a.z, a.w);
-}
-
-BandRecord loadBand(uint word) {
-  uvec4 a = tableUnit(word);
-  return BandRecord(a.x, a.y, a.z, a.w);
-}
-
-InstanceRecord loadInstance(uint word) {
-  uvec4 a = tableUnit(word);
-  uvec4 b = tableUnit(word + 4u);
-  return InstanceRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
-}
+LOAD_FOUR(loadBank, BankRecord)
+LOAD_FOUR(loadBand, BandRecord)
+LOAD_EIGHT(loadInstance, InstanceRecord)
 
 ExtensionRecord loadExtension(uint word) {
   uvec4 a = tableUnit(word);
@@ -66,15 +54,8 @@ ExtensionRecord loadExtension(uint word) {
   return ExtensionRecord(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
 }
 
-CandidateRecord loadCandidate(uint word) {
-  uvec4 a = tableUnit(word);
-  return CandidateRecord(a.x, a.y, a.z, a.w);
-}
-
-CulledDispatchRecord loadCulledDispatch(uint word) {
-  uvec4 a = tableUnit(word);
-  return CulledDispatchRecord(a.x, a.y, a.z, a.w);
-}
+LOAD_FOUR(loadCandidate, CandidateRecord)
+LOAD_FOUR(loadCulledDispatch, CulledDispatchRecord)
 
 #ifdef TABLES_ARE_WRITTEN
 void storeGroup(uint word, GroupRecord r) {
