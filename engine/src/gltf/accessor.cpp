@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "gltf/failure.h"
@@ -11,54 +12,33 @@
 namespace dermis::gltf {
 namespace {
 
+/// What glTF calls a number: its name, and how many bytes or components it has.
+struct Named {
+  int number;
+  const char* name;
+  std::uint32_t size;
+};
+constexpr Named componentTypes[] = {{TINYGLTF_COMPONENT_TYPE_BYTE, "byte", 1},
+                                    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, "unsigned byte", 1},
+                                    {TINYGLTF_COMPONENT_TYPE_SHORT, "short", 2},
+                                    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, "unsigned short", 2},
+                                    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, "unsigned int", 4},
+                                    {TINYGLTF_COMPONENT_TYPE_FLOAT, "float", 4}};
+constexpr Named types[] = {{TINYGLTF_TYPE_SCALAR, "SCALAR", 1}, {TINYGLTF_TYPE_VEC2, "VEC2", 2},
+                           {TINYGLTF_TYPE_VEC3, "VEC3", 3},     {TINYGLTF_TYPE_VEC4, "VEC4", 4},
+                           {TINYGLTF_TYPE_MAT2, "MAT2", 4},     {TINYGLTF_TYPE_MAT3, "MAT3", 9},
+                           {TINYGLTF_TYPE_MAT4, "MAT4", 16}};
+
+/// `ReferenceCheck` has refused files with other numbers.
+const Named& find(std::span<const Named> list, int number) {
+  for (const Named& named : list) {
+    if (named.number == number) return named;
+  }
+  return list.back();
+}
+
 std::uint32_t sizeOfComponent(int componentType) {
-  switch (componentType) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return 1;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return 2;
-    default:
-      return 4;
-  }
-}
-
-std::uint32_t componentCount(int type) {
-  switch (type) {
-    case TINYGLTF_TYPE_SCALAR:
-      return 1;
-    case TINYGLTF_TYPE_VEC2:
-      return 2;
-    case TINYGLTF_TYPE_VEC3:
-      return 3;
-    case TINYGLTF_TYPE_VEC4:
-    case TINYGLTF_TYPE_MAT2:
-      return 4;
-    case TINYGLTF_TYPE_MAT3:
-      return 9;
-    default:
-      return 16;
-  }
-}
-
-const char* typeName(int type) {
-  switch (type) {
-    case TINYGLTF_TYPE_SCALAR:
-      return "SCALAR";
-    case TINYGLTF_TYPE_VEC2:
-      return "VEC2";
-    case TINYGLTF_TYPE_VEC3:
-      return "VEC3";
-    case TINYGLTF_TYPE_VEC4:
-      return "VEC4";
-    case TINYGLTF_TYPE_MAT2:
-      return "MAT2";
-    case TINYGLTF_TYPE_MAT3:
-      return "MAT3";
-    default:
-      return "MAT4";
-  }
+  return find(componentTypes, componentType).size;
 }
 
 // The columns of a matrix start at multiples of 4 bytes (glTF 2.0, 3.6.2.4). This matters only for
@@ -74,7 +54,7 @@ std::uint64_t elementSize(const tinygltf::Accessor& accessor) {
     case TINYGLTF_TYPE_MAT4:
       return matrix(4);
     default:
-      return component * componentCount(accessor.type);
+      return component * find(types, accessor.type).size;
   }
 }
 
@@ -125,26 +105,7 @@ std::uint32_t loadInteger(const std::byte* address, int componentType) {
 }  // namespace
 
 std::string formatName(Format format) {
-  const char* name = "float";
-  switch (format.componentType) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      name = "byte";
-      break;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      name = "unsigned byte";
-      break;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      name = "short";
-      break;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      name = "unsigned short";
-      break;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      name = "unsigned int";
-      break;
-    default:
-      break;
-  }
+  const char* name = find(componentTypes, format.componentType).name;
   return format.normalized ? join("normalized ", name) : std::string(name);
 }
 
@@ -312,8 +273,8 @@ void Source::require(int index, int type, std::span<const Format> formats, const
     allowed += formatName(candidate);
   }
   const std::string sentence =
-      join(where, ": accessor ", index, " is ", typeName(accessor.type), " of ", formatName(format),
-           ", not ", typeName(type), " of ", allowed);
+      join(where, ": accessor ", index, " is ", find(types, accessor.type).name, " of ",
+           formatName(format), ", not ", find(types, type).name, " of ", allowed);
   if (accessor.type != type || !isIn(tolerated)) failInvalid(sentence);
   notes_.broken(NoteKind::format, sentence);
 }
@@ -344,7 +305,7 @@ std::uint32_t Source::count(int accessor) const {
 }
 
 std::uint32_t Source::components(int accessor) const {
-  return componentCount(content().accessors[static_cast<std::size_t>(accessor)].type);
+  return find(types, content().accessors[static_cast<std::size_t>(accessor)].type).size;
 }
 
 bool Source::hasNoData(int accessor) const {
