@@ -1,7 +1,6 @@
 #include "convert.h"
 
 #include <algorithm>
-#include <type_traits>
 #include <variant>
 
 namespace dermis::c {

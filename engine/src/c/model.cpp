@@ -1,7 +1,6 @@
 // glTF.
 #include <algorithm>
 #include <deque>
-#include <memory>
 #include <optional>
 
 #include "clips.h"

@@ -1,6 +1,4 @@
 // Scenes on the CPU.
-#include <memory>
-#include <optional>
 
 #include "convert.h"
 #include "dermis/cpu.h"

@@ -1,7 +1,6 @@
 // Contexts, batches and scenes on a Vulkan device.
 #include <vulkan/vulkan_core.h>
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 

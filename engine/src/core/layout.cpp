@@ -1,7 +1,5 @@
 #include "dermis/layout.h"
 
-#include <algorithm>
-#include <array>
 #include <string>
 
 #include "dermis/plan.h"

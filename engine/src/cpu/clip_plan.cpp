@@ -1,7 +1,6 @@
 #include "cpu/clip_plan.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "strict_floating_point.h"
 

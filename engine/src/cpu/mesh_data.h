@@ -2,7 +2,6 @@
 // component by component. The last block is padded with vertices without influences.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>

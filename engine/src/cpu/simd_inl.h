@@ -1,8 +1,6 @@
 // Vectors of floats, and of three and four of them. See kernels_inl.h.
 #pragma once
 
-#include <cstdint>
-
 #include "hwy/highway.h"
 
 // Where vectors are plain arrays, inlining everything costs a minute of compile time.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <string>
-#include <tuple>
 
 #include "cpu/task.h"
 #include "cpu/thread_memory.h"

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <compare>
 #include <iterator>
-#include <limits>
 #include <optional>
 #include <utility>
 

@@ -1,7 +1,6 @@
 // Which nodes are below others.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

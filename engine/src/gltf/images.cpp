@@ -1,10 +1,8 @@
 #include "gltf/images.h"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <string_view>
-#include <utility>
 
 #include "gltf/buffers.h"
 #include "gltf/failure.h"

@@ -1,5 +1,4 @@
 // EXT_meshopt_compression and KHR_meshopt_compression.
-#include <algorithm>
 #include <limits>
 #include <utility>
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <limits>
 #include <numeric>
-#include <span>
 
 #include "gltf/failure.h"
 #include "gltf/reader.h"

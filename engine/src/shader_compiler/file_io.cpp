@@ -1,7 +1,6 @@
 #include "shader_compiler/file_io.h"
 
 #include <cerrno>
-#include <cstdint>
 #include <fstream>
 #include <random>
 #include <sstream>

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <initializer_list>
 #include <numeric>
-#include <string_view>
 
 #include <glm/matrix.hpp>
 

@@ -1,7 +1,6 @@
 #include "vulkan/pipelines.h"
 
 #include <algorithm>
-#include <array>
 #include <span>
 #include <string>
 #include <string_view>

@@ -1,7 +1,6 @@
 #include "dermis/vulkan/drawing.h"
 
 #include <string>
-#include <utility>
 
 namespace dermis::vulkan {
 

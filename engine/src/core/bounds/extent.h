@@ -1,11 +1,9 @@
 // Boxes and affine maps in double precision, for the bounds of a skinned mesh.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 
 #include "bounds/joint_bounds_data.h"

@@ -1,7 +1,6 @@
 #include "centers/pair_index.h"
 
 #include <bit>
-#include <utility>
 
 #include "strict_floating_point.h"
 

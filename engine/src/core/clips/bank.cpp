@@ -2,7 +2,6 @@
 #include "clips/bank.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <optional>
 #include <string>

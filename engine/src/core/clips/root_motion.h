@@ -1,7 +1,6 @@
 // Root motion: the path of a node over the ground, which is taken out of a clip.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>

@@ -1,7 +1,6 @@
 // Checks the rules of a batch. Messages name the job or pose at fault.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <string>

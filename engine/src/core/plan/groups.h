@@ -2,7 +2,6 @@
 // variant, one output layout.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 

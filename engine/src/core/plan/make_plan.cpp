@@ -1,7 +1,6 @@
 // Turns a batch into work, and the work into a plan.
 
 #include <algorithm>
-#include <string>
 
 #include "plan/encode.h"
 

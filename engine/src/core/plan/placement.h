@@ -2,7 +2,6 @@
 // Neither depends on a frame.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -1,8 +1,6 @@
 // The specialization of a kernel, for which a `PipelineId` stands.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "dermis/layout.h"

@@ -1,6 +1,5 @@
 // Banks of clips, and figures: poses that the scene samples from clips.
 
-#include <algorithm>
 #include <string>
 #include <utility>
 

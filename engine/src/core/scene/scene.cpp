@@ -3,7 +3,6 @@
 #include "dermis/scene.h"
 
 #include <algorithm>
-#include <array>
 #include <string>
 #include <utility>
 

@@ -1,6 +1,5 @@
 #include "dermis/scene.h"
 
-#include <string>
 #include <utility>
 
 #include "plan/check.h"

@@ -2,7 +2,6 @@
 // tables below, from which docs/states.md is made.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
