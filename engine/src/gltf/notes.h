@@ -67,8 +67,6 @@ class Notes {
   /// `strict`: broken rules are errors.
   explicit Notes(bool strict) : strict_(strict) {}
 
-  bool strict() const { return strict_; }
-
   /// Counts a broken rule. The parts form the sentence about it, which names the place. If strict,
   /// throws `Failure` with that sentence instead.
   template <typename... Parts>

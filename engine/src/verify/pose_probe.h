@@ -61,9 +61,6 @@ class PoseProbe {
   /// The positions of the sampled vertices, by linear blending.
   std::vector<glm::dvec3> skin(const Pose& pose) const;
   PoseScore score(const Pose& pose, const BindSkeleton& skeleton) const;
-  /// Joints with a weight in the sample, ascending.
-  const std::vector<std::uint32_t>& usedJoints() const { return usedJoints_; }
-  double meshSize() const { return meshSize_; }  ///< diagonal of the box in bind pose
 
  private:
   struct Weight {

@@ -21,7 +21,6 @@ class Curve {
         const std::optional<Value>& base);
 
   Value at(double time, Side side = Side::after) const;
-  bool isAnimated() const { return channel_ != nullptr; }
   bool isRotation() const { return path_ == ChannelPath::rotation; }
   /// Times of the keys in the clip. Between two of them there is no corner.
   std::vector<double> keyTimes(double duration) const;
