@@ -16,7 +16,7 @@ release=$3
 shift 3
 consumers=$(cd "$(dirname "$0")/../package/consumers" && pwd)
 tools="ca-certificates g++ cmake ninja-build pkg-config mesa-vulkan-drivers"
-build_needs="libvulkan-dev libhwy-dev libglm-dev libtinygltf-dev nlohmann-json3-dev libmeshoptimizer-dev libdraco-dev"
+build_needs="dpkg-dev file libvulkan-dev libhwy-dev libglm-dev libtinygltf-dev nlohmann-json3-dev libmeshoptimizer-dev libdraco-dev"
 version=$(basename "$source_package" .tar.gz)
 version=${version#dermis-}
 
