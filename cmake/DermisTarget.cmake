@@ -57,11 +57,12 @@ if(DERMIS_BUILD_FUZZERS)
 endif()
 if(DERMIS_SANITIZE STREQUAL "address")
   target_compile_options(dermis_build_flags INTERFACE
-    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+    -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
     -fno-sanitize=vptr) # it needs RTTI, which engine code does not have
   target_link_options(dermis_build_flags INTERFACE -fsanitize=address,undefined)
-  if(NOT DERMIS_SANITIZE_TESTS)
-    # These checks at each access cost up to a third of the compile time, and the address sanitizer finds nearly all that they find.
+  if(NOT DERMIS_SANITIZE_TESTS AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # With it these checks at each access cost up to a third of the compile time, and the address sanitizer finds nearly all that they
+    # find.
     target_compile_options(dermis_build_flags INTERFACE -fno-sanitize=null,object-size,pointer-overflow)
   endif()
 elseif(DERMIS_SANITIZE STREQUAL "thread")
