@@ -285,7 +285,8 @@ struct DispatchCommand {
 
 /// Bytes of the CPU that are written to a buffer, by way of a staging buffer and vkCmdCopyBuffer.
 /// Uploads, copies and clears between two barriers do not depend on each other. The engine may
-/// write a mapping instead, if earlier frames that use the buffer are complete.
+/// write a mapping instead, if earlier frames that use the buffer are complete and no `CopyCommand`
+/// before it in the commands writes there, as one does when a buffer has grown.
 struct UploadCommand {
   BufferPart to;
   std::span<const std::byte> bytes;  ///< as many as the part has; valid as long as the commands

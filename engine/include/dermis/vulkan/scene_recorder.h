@@ -181,8 +181,9 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// Records the uploads and the commands of the frame, with the barriers between them. Records
   /// nothing if nothing changed and no instance is culled on the GPU. Call it once after each
   /// `beginFrame`, outside a render pass, with a primary or secondary command buffer. Before it the
-  /// engine records the barrier between the last use of the output and `Use::dermis`, and after it
-  /// the barrier between `Use::dermis` and the next use.
+  /// engine records the barrier between `Use::dermis` and the last use of the output, and of what
+  /// `poseRange` and `drivenRange` name, and after it the barrier between `Use::dermis` and the next
+  /// use.
   ///
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;
