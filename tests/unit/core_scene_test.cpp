@@ -1237,6 +1237,13 @@ TEST(Scene, BudgetsThatMakeNoSenseAreRefusedByName) {
   bad.scene.jointCapacity = Capacity::fixed(1000);
   expectRefused(bad, ErrorCode::limitExceeded, "jointCapacity");
   bad = smallScene();
+  bad.limits.maxStorageBufferRange = 65536;
+  bad.scene.instanceCapacity =
+      Capacity::fixed((65536 - sizeof(abi::CounterRecord)) / sizeof(abi::HistoryRecord));
+  EXPECT_TRUE(PlannedScene().tryToCreate(bad).ok());
+  bad.scene.instanceCapacity = Capacity::fixed(bad.scene.instanceCapacity.initial + 1);
+  expectRefused(bad, ErrorCode::limitExceeded, "instanceCapacity");
+  bad = smallScene();
   bad.scene.framesInFlight = 0xffffffffu;
   bad.scene.jointCapacity =
       Capacity::fixed(bad.scene.framesInFlight);  // 48 times their product is more than 2^64

@@ -26,6 +26,11 @@ std::uint64_t firstUnits(const SceneSetup& setup) {
                   setup.limits.maxStorageBufferRange / unitBytes);
 }
 
+/// Whose history is in one storage buffer range.
+std::uint64_t mostInstances(std::uint64_t range) {
+  return (range - historyRecords) / sizeof(abi::HistoryRecord);
+}
+
 /// With maxima that buffers can have.
 SceneDescription limited(SceneDescription scene, std::uint64_t range) {
   constexpr std::uint64_t mostIndices = 0xffffffff;
@@ -37,7 +42,7 @@ SceneDescription limited(SceneDescription scene, std::uint64_t range) {
   limit(scene.gpuJointCapacity, mostIndices);
   // Small enough that sums do not overflow.
   limit(scene.outputCapacity, std::uint64_t{1} << 60);
-  limit(scene.instanceCapacity, range / sizeof(abi::HistoryRecord));
+  limit(scene.instanceCapacity, mostInstances(range));
   limit(scene.boundsCapacity, range / sizeof(InstanceResult));
   return scene;
 }
@@ -63,7 +68,7 @@ Result<void> checkSetup(const SceneSetup& setup) {
          range / sizeof(JointMatrix) / description.framesInFlight, true},
         {"gpuJointCapacity", description.gpuJointCapacity, range / sizeof(JointMatrix), true},
         {"outputCapacity", description.outputCapacity, anySize},
-        {"instanceCapacity", description.instanceCapacity, range / sizeof(abi::HistoryRecord)},
+        {"instanceCapacity", description.instanceCapacity, mostInstances(range)},
         {"boundsCapacity", description.boundsCapacity, range / sizeof(InstanceResult), true}}) {
     const Capacity& capacity = field.capacity;
     if (capacity.maximum == 0 && !field.mayBeNone)
