@@ -614,6 +614,15 @@ TEST(DracoTest, RefusesWhatDoesNotFitTheAccessors) {
   FileBuilder file = right;
   file.primitive()["mode"] = 5;
   expectError(file.load(), ErrorCode::unsupportedFeature, "only mode 4, triangles");
+  // Decoded indices have 4 bytes; what the file has for some of them has 2.
+  file = right;
+  const std::size_t elements = file.addView(bytesOf(std::vector<std::uint8_t>{0, 1, 2}));
+  const std::size_t values = file.addView(bytesOf(std::vector<std::uint16_t>{0, 1, 2}));
+  indices(file)["sparse"] = {
+      {"count", 3},
+      {"indices", {{"bufferView", elements}, {"componentType", unsignedByteType}}},
+      {"values", {{"bufferView", values}}}};
+  expectError(file.load(), ErrorCode::unsupportedFeature, "accessor 6 of the indices is sparse");
 }
 
 TEST(DracoTest, TruncatedDataIsAnError) {

@@ -92,6 +92,12 @@ class PrimitiveDecoder {
       if (found != attributes.end() && name != indicesAttribute) ids.emplace(found->second, id);
     }
     const int indices = attributes.at(indicesAttribute);
+    // Its values were checked as those of its own type, and are read as those of `fillIndices`.
+    if (accessor(indices).sparse.isSparse) {
+      fail(
+          ErrorCode::unsupportedFeature,
+          join(where, ": accessor ", indices, " of the indices is sparse, which is not supported"));
+    }
     if (isDecoded(ids, indices, from.view, where)) return;
 
     const std::size_t vertexCount = accessor(attributes.at("POSITION")).count;
