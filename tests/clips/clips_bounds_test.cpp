@@ -17,6 +17,7 @@
 
 #include "clip_rig.h"
 #include "clip_variants.h"
+#include "clips/bank.h"
 #include "clips/sample.h"
 #include "dermis/clips.h"
 #include "dermis/mesh.h"
@@ -24,6 +25,7 @@
 #include "exhaustive.h"
 #include "few_cases.h"
 #include "random_number.h"
+#include "stored.h"
 
 namespace dermis::test {
 namespace {
@@ -309,6 +311,69 @@ TEST(ClipsBounds, ContainWhatIsReachedBeforeAJump) {
   checkClips(rig, view.mesh(), 0, Method::linear, 200, random, ratios);
   ratios.print("jump");
   EXPECT_LT(ratios.worst, 1.1);
+}
+
+/// A bank whose nodes are below each other and at rest. Its skin has the last of them, and a joint
+/// below none.
+PackedClips deepBank(std::uint32_t nodes) {
+  std::vector<std::uint32_t> words(sizeof(BankHeader) / 4);
+  const auto end = [&] { return static_cast<std::uint32_t>(words.size()); };
+  const auto append = [&](const auto& record) {
+    const std::uint32_t place = end();
+    words.resize(words.size() + sizeof(record) / 4);
+    std::memcpy(&words[place], &record, sizeof(record));
+    return place;
+  };
+  BankHeader header{};
+  header.magic = clipsMagic;
+  header.version = clipsVersion;
+  header.nodeCount = nodes;
+  header.skinCount = header.clipCount = 1;
+  header.nodes = end();
+  for (std::uint32_t i = 0; i < nodes; ++i) {
+    BankNode node{};
+    node.parent = i == 0 ? noNode : i - 1;
+    node.source = i;
+    node.rotation[3] = 1;
+    std::ranges::fill(node.scale, 1.0f);
+    append(node);
+  }
+  BankSkin skin{};
+  skin.jointCount = 2;
+  skin.nodes = append(std::array<std::uint32_t, 4>{nodes - 1, noNode});
+  skin.matrices = append(std::array<JointMatrix, 2>{});
+  header.skins = append(skin);
+  BankClip clip{};
+  clip.classes = clip.tracks = end();
+  words.resize(words.size() + (std::size_t{3} * nodes + 3) / 4 * 4);
+  header.clips = append(clip);
+  header.masks = header.morphed = end();
+  std::memcpy(words.data(), &header, sizeof(header));
+  finishStored(words);
+  return *PackedClips::fromBytes(std::as_bytes(std::span(words)));
+}
+
+// A file may have as many nodes below each other as it likes.
+TEST(ClipsBounds, OfADeepSkeletonNeedNoDeepStack) {
+  const PackedClips bank = deepBank(100'000);
+  const std::array<float, 3> position{1, 2, 3};
+  const std::array<float, 2> weights{0.5f, 0.5f};
+  const std::array<std::uint32_t, 2> joints{0, 1};
+  const InfluenceSet set{{joints.data(), 1, 8, ComponentType::uint32, 2},
+                         {weights.data(), 1, 8, ComponentType::float32, 2}};
+  MeshView mesh;
+  mesh.vertexCount = 1;
+  mesh.positions = floatAttribute(position.data(), 1, 3);
+  mesh.influenceSets = {&set, 1};
+  const JointBounds reach = *jointBounds(mesh, 2);
+  const std::uint32_t first = 0;
+  for (const Result<Box>& box :
+       {clipBounds(bank, 0, 0, reach, Method::dualQuaternion),
+        blendBounds(bank, {&first, 1}, 0, reach, Method::dualQuaternion)}) {
+    ASSERT_TRUE(box.ok());
+    EXPECT_LE(box->min[1], 2);
+    EXPECT_GE(box->max[1], 2);
+  }
 }
 
 TEST(ClipsBounds, RefuseBadArguments) {

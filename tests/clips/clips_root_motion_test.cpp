@@ -352,6 +352,29 @@ TEST(ClipsRootMotion, RefusesWhatCannotWork) {
   refusesTimes(0, 0, 1e30, "a time is 2^52 loops away");
 }
 
+// The position over the ground and the height are both infinite in float32; between two keys of
+// opposite sign there is none.
+TEST(ClipsRootMotion, HeightsBeyondFloat32) {
+  constexpr float far = 3.4e38f;
+  const Floats times{0, 0.004f, 0.0125f, 0.016f, 1};
+  const Floats moved{0, 0, 0, far, 0.75f * far, 0, -far, -0.75f * far, 0, 1, 1, 0, 2, 2, 0};
+  Skeleton skeleton;
+  skeleton.nodes.resize(2);
+  // Its inverse turns the axis upwards to (0.8, 0.6, 0).
+  const double angle = std::atan2(0.8, 0.6) / 2;
+  skeleton.nodes[0].rotation = {0, 0, std::sin(angle), std::cos(angle)};
+  skeleton.nodes[1].parent = 0;
+  const std::array<std::uint32_t, 2> joints{0, 1};
+  const std::array<JointMatrix, 2> inverseBind{};
+  skeleton.skins.push_back({"", joints, inverseBind});
+  ClipView clip{.name = "far", .duration = 1, .channels = {}};
+  clip.channels = {{1, ChannelPath::translation, Interpolation::linear, times, moved}};
+  const Result<PackedClips> packed =
+      packClips(skeleton, {&clip, 1}, {.maxError = 1e36, .rootMotion = RootMotionOptions{1, 1}});
+  ASSERT_FALSE(packed.ok());
+  EXPECT_EQ(packed.error().code, ErrorCode::limitExceeded) << packed.error().message;
+}
+
 // What rounding makes of a path of this size is much more than its error may be. It must not be
 // split as long as that takes, into 200 MB of keys.
 TEST(ClipsRootMotion, TooFarForItsError) {

@@ -301,7 +301,7 @@ Result<void> checkClips(const Skeleton& skeleton, std::span<const ClipView> clip
         width = skeleton.nodes[channel.node].weights.size();
       const std::size_t parts = channel.interpolation == Interpolation::cubicSpline ? 3 : 1;
       if (!isNode || width == 0 || channel.times.empty() ||
-          channel.values.size() != channel.times.size() * width * parts) {
+          channel.values.size() != std::uint64_t{channel.times.size()} * width * parts) {
         return refused("clip " + std::to_string(&clip - clips.data()) + ": channel " +
                        std::to_string(&channel - clip.channels.data()) +
                        " has no keys, values of another number, or a node that does not exist");

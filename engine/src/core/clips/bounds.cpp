@@ -342,8 +342,11 @@ class ClipRegions final : public bounds::JointRegions {
   }
 
   Chain chainBetween(std::uint32_t above, std::uint32_t node) const {
-    if (node == above) return {};
-    return below(chainBetween(above, bank_.node(node).parent), locals_[node]);
+    std::vector<std::uint32_t> nodes;
+    for (; node != above; node = bank_.node(node).parent) nodes.push_back(node);
+    Chain chain;
+    for (std::size_t i = nodes.size(); i-- > 0;) chain = below(chain, locals_[nodes[i]]);
+    return chain;
   }
 
   /// What the product with the last matrix of a joint adds at its origin.

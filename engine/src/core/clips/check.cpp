@@ -96,7 +96,8 @@ Result<void> checkChannel(const Skeleton& skeleton, const ChannelView& channel,
   if (node.matrix && !isWeights) return invalid(title + " has a matrix, so it cannot be animated");
   const std::size_t width =
       widthOf(channel.path, node) * (channel.interpolation == Interpolation::cubicSpline ? 3u : 1u);
-  if (channel.times.empty() || channel.values.size() != channel.times.size() * width) {
+  if (channel.times.empty() ||
+      channel.values.size() != std::uint64_t{channel.times.size()} * width) {
     return invalid(title + " has " + std::to_string(channel.times.size()) + " key times and " +
                    std::to_string(channel.values.size()) + " numbers: " + std::to_string(width) +
                    " are needed for each of at least one key");

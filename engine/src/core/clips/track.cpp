@@ -212,6 +212,7 @@ bool quantize(Track& track, const std::vector<Value>& values) {
     Value low = values[0], high = values[0];
     for (const Value& value : values) {
       for (std::size_t i = 0; i < 3; ++i) {
+        if (!std::isfinite(value[i])) return false;
         low[i] = std::min(low[i], value[i]);
         high[i] = std::max(high[i], value[i]);
       }
