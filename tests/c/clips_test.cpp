@@ -128,6 +128,20 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
       dermis_sample_pose(bank, layers.data(), 2, 1, joints.data(), primitive.joint_count, &error),
       "there is no skin 1");
   expectError(dermis_sample_pose(bank, nullptr, 2, 0, joints.data(), 1, &error), "layers is null");
+
+  const auto refuses = [&](const char* text, dermis_code code) {
+    Owned<dermis_bank> none;
+    expectError(dermis_pack_clips(&source, &none, &error), text, code);
+  };
+  source.mask_count = 0xffffffffu;
+  refuses("there are 4294967295 masks, but at most 31 are allowed", DERMIS_LIMIT_EXCEEDED);
+  source.mask_count = 2;
+  // The next one would not be aligned.
+  std::array<std::byte, sizeof(dermis_mesh_view) + 8> larger{};
+  auto* const odd = new (larger.data()) dermis_mesh_view(*primitive.mesh);
+  odd->size += 4;
+  source.meshes = odd;
+  refuses("meshes: its size is", DERMIS_INVALID_ARGUMENT);
 }
 
 TEST_F(CClipsTest, BoxesAreThoseOfCpp) {

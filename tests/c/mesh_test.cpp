@@ -130,6 +130,12 @@ TEST(CMeshTest, FindingsAndRepair) {
   };
   expectError(dermis_validate(&source.view, source.jointCount, stop, nullptr, &error), "callback",
               DERMIS_LIMIT_EXCEEDED);
+  // A number that is none of Dermis.
+  const dermis_finding_callback fails = [](void*, const dermis_finding*) {
+    return static_cast<dermis_code>(-2);
+  };
+  expectError(dermis_validate(&source.view, source.jointCount, fails, nullptr, &error), "callback",
+              static_cast<dermis_code>(-2));
 
   Owned<dermis_packed> packed;
   expectError(dermis_pack(&source.view, source.jointCount, &packed, &error), "a mesh of C",

@@ -54,7 +54,11 @@ extern "C" {
 // ---- Errors, the version, objects.
 
 // What a function returns. The error sentence says what is wrong.
+#ifdef __cplusplus  // callbacks may return any number, which C++ allows with this type only
+typedef enum dermis_code : uint32_t {
+#else
 typedef enum dermis_code {
+#endif
   DERMIS_OK = 0,
   DERMIS_INVALID_ARGUMENT = 1,     // the caller broke a rule of the function
   DERMIS_INVALID_MESH = 2,         // `dermis_pack` refuses the mesh; `dermis_repair` may help

@@ -87,6 +87,10 @@ struct Source {
     for (const dermis_clip_view& clip : inArray(source.clips, source.clip_count, "clips"))
       clips.push_back(clipOf(clip));
     const std::size_t nodes = source.node_count;
+    if (source.mask_count > maxMasks)
+      fail("there are " + std::to_string(source.mask_count) + " masks, but at most " +
+               std::to_string(maxMasks) + " are allowed",
+           DERMIS_LIMIT_EXCEEDED);
     const std::span<const float> all = array(source.masks, source.mask_count * nodes, "masks");
     for (std::size_t mask = 0; mask < source.mask_count; ++mask)
       masks.push_back(all.subspan(mask * nodes, nodes));
@@ -98,12 +102,9 @@ struct Source {
                             .upAxis = source.up_axis == 0 ? 1 : source.up_axis - 1};
     }
     if (source.meshes == nullptr) return;
-    const std::size_t stride = source.meshes->size;
-    for (std::uint32_t skin = 0; skin < source.skin_count; ++skin) {
-      const View view(reinterpret_cast<const dermis_mesh_view*>(
-          reinterpret_cast<const std::byte*>(source.meshes) + skin * stride));
-      bounds.push_back(must(
-          jointBounds(view.mesh, static_cast<std::uint32_t>(skeleton.skins[skin].joints.size()))));
+    for (const dermis_mesh_view& mesh : inArray(source.meshes, source.skin_count, "meshes")) {
+      const std::size_t joints = skeleton.skins[bounds.size()].joints.size();
+      bounds.push_back(must(jointBounds(View(&mesh).mesh, static_cast<std::uint32_t>(joints))));
     }
     for (const JointBounds& of : bounds) meshes.push_back(&of);
     options.meshes = meshes;
@@ -141,7 +142,9 @@ ClipsForCaller::ClipsForCaller(const Skeleton& skeleton, std::span<const ClipVie
     result.weights = node.weights.data();
     result.weight_count = static_cast<std::uint32_t>(node.weights.size());
     if (!node.matrix) continue;
-    result.matrix = matrices_.emplace_back(*node.matrix)[0].data();
+    std::array<double, 12>& matrix = matrices_.emplace_back();
+    for (std::size_t i = 0; i < 12; ++i) matrix[i] = (*node.matrix)[i / 4][i % 4];
+    result.matrix = matrix.data();
   }
   for (const SkeletonSkin& skin : skeleton.skins) {
     skins_.push_back({sizeof(dermis_skin), static_cast<std::uint32_t>(skin.joints.size()),

@@ -1,6 +1,7 @@
 // A skeleton and its clips, for the caller.
 #pragma once
 
+#include <array>
 #include <deque>
 #include <span>
 #include <string>
@@ -21,7 +22,7 @@ struct ClipsForCaller {
 
  private:
   std::deque<std::string> names_;
-  std::deque<Transform> matrices_;
+  std::deque<std::array<double, 12>> matrices_;
   std::deque<std::vector<dermis_channel>> channels_;
   std::vector<dermis_node> nodes_;
   std::vector<dermis_skin> skins_;

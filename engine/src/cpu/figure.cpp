@@ -55,8 +55,8 @@ void RigScratch::prepare(const PackedRig& rig) {
 
 void evaluatePlainly(const PackedRig& rig, std::span<const RigPose> poses, RigScratch& scratch) {
   for (const RigPose& pose : poses) {
-    evaluateRigIn(&scratch.numbers[0].v[0], rig, pose.written, pose.givenWeights, pose.driven,
-                  pose.weights);
+    evaluateRigIn(numbersOf(scratch.numbers.data()), rig, pose.written, pose.givenWeights,
+                  pose.driven, pose.weights);
   }
 }
 

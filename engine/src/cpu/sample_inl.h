@@ -413,9 +413,9 @@ DERMIS_INLINE void multiply(const float* left, const float* right, float* produc
   sums = hn::Add(sums, hn::Mul(hn::Broadcast<2>(rows), r2));
   const auto row = hn::LoadU(d, left + 8);
   auto sum = hn::Add(hn::And(row, hn::LowerHalf(d, last)),
-                     hn::Mul(hn::Set(d, left[8]), hn::LowerHalf(d, r0)));
-  sum = hn::Add(sum, hn::Mul(hn::Set(d, left[9]), hn::LowerHalf(d, r1)));
-  sum = hn::Add(sum, hn::Mul(hn::Set(d, left[10]), hn::LowerHalf(d, r2)));
+                     hn::Mul(hn::Broadcast<0>(row), hn::LowerHalf(d, r0)));
+  sum = hn::Add(sum, hn::Mul(hn::Broadcast<1>(row), hn::LowerHalf(d, r1)));
+  sum = hn::Add(sum, hn::Mul(hn::Broadcast<2>(row), hn::LowerHalf(d, r2)));
   hn::StoreU(sums, wide, product);
   hn::StoreU(sum, d, product + 8);
   static_cast<void>(du);

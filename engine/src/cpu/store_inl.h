@@ -140,14 +140,11 @@ HWY_NOINLINE HWY_ATTR void storeUnits(D d, const Quad& quad, std::size_t stride,
   std::byte* places[blocksOf<D>];
   for (std::size_t i = 0; i < blocksOf<D>; ++i)
     places[i] = to[isLone ? 0 : i] + first * step + (isLone ? i * 4 * stride : 0) + quad.offset;
-  const Vec<D>* const a = tile.slots[0] + quad.slot[0];
-  const Vec<D>* const b = tile.slots[0] + quad.slot[1];
-  const Vec<D>* const c = tile.slots[0] + quad.slot[2];
-  const Vec<D>* const e = tile.slots[0] + quad.slot[3];
+  const auto [a, b, c, e] = quad.slot;
   for (std::size_t unit = first; unit < end; ++unit) {
-    const std::size_t place = unit * std::size(tile.slots[0]);
+    const Vec<D>* const slots = tile.slots[unit];
     if constexpr (size > 4) {
-      Vec<D> v0 = a[place], v1 = b[place], v2 = c[place], v3 = e[place];
+      Vec<D> v0 = slots[a], v1 = slots[b], v2 = slots[c], v3 = slots[e];
       transpose4(d, v0, v1, v2, v3);
       constexpr std::size_t most = isDense ? 16 : size;
       storeEach<most>(d, v0, places, 0);
@@ -155,10 +152,10 @@ HWY_NOINLINE HWY_ATTR void storeUnits(D d, const Quad& quad, std::size_t stride,
       storeEach<most>(d, v2, places, 2 * stride);
       storeEach<size>(d, v3, places, 3 * stride);
     } else if constexpr (isDense) {
-      storeEach<16>(d, a[place], places, 0);
+      storeEach<16>(d, slots[a], places, 0);
     } else {
       HWY_ALIGN float words[hn::MaxLanes(d)];
-      hn::Store(a[place], d, words);
+      hn::Store(slots[a], d, words);
       for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane)
         std::memcpy(places[lane / 4] + lane % 4 * stride, words + lane, size);
     }

@@ -226,8 +226,9 @@ AffineMap affineOf(const JointMatrix& matrix) {
 }
 
 bool isFinite(const JointMatrix& matrix) {
-  return std::all_of(&matrix.m[0][0], &matrix.m[0][0] + 12,
-                     [](float value) { return std::isfinite(value); });
+  return std::ranges::all_of(matrix.m, [](const auto& row) {
+    return std::ranges::all_of(row, [](float value) { return std::isfinite(value); });
+  });
 }
 
 /// The rotation between two joints: the cosine of half its angle, not negative, and the axis,

@@ -67,7 +67,7 @@ void evaluateRigIn(float* scratch, const PackedRig& rig, std::span<const JointMa
                    std::span<const float> givenWeights, std::span<JointMatrix> driven,
                    std::span<float> weights) {
   const RigBlob blob(rig);
-  std::ranges::copy(givenWeights, weights.begin());
+  if (weights.data() != givenWeights.data()) std::ranges::copy(givenWeights, weights.begin());
   std::array<float, maxRigExamples> basis{};
   const std::span rotations(reinterpret_cast<rigs::Quat<float>*>(scratch), blob.header.mostInputs);
   rigs::PoseMemory memory{written, driven, weights};
