@@ -437,7 +437,8 @@ class DERMIS_CORE_API Scene {
   /// write poses, and execute the frame again, or begin another one. All instances are skinned
   /// again, their motion restarts, and bounds are empty until then, so one frame has no motion
   /// vectors. What was uploaded is uploaded again, except that the engine writes and marks again
-  /// the poses and morph weights that its GPU passes wrote. Everything that was added, removed or changed remains.
+  /// the poses and morph weights that its GPU passes wrote. Everything that was added, removed or
+  /// changed remains.
   ///
   /// O(instances). Fails with `invalidArgument` if `frame` is not the one that was executed last,
   /// or if `beginFrame` was called since.
