@@ -92,7 +92,7 @@ class PrimitiveDecoder {
       if (found != attributes.end() && name != indicesAttribute) ids.emplace(found->second, id);
     }
     const int indices = attributes.at(indicesAttribute);
-    // Its values were checked as those of its own type, and are read as those of `fillIndices`.
+    // Its values were checked as numbers of the type in the file; decoded indices are of another.
     if (accessor(indices).sparse.isSparse) {
       fail(
           ErrorCode::unsupportedFeature,

@@ -182,8 +182,8 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// nothing if nothing changed and no instance is culled on the GPU. Call it once after each
   /// `beginFrame`, outside a render pass, with a primary or secondary command buffer. Before it the
   /// engine records the barrier between `Use::dermis` and the last use of the output, and of what
-  /// `poseRange` and `drivenRange` name, and after it the barrier between `Use::dermis` and the next
-  /// use.
+  /// `poseRange` and `drivenRange` name, and after it the barrier between `Use::dermis` and the
+  /// next use.
   ///
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;
