@@ -355,9 +355,11 @@ TEST(ClipsRootMotion, RefusesWhatCannotWork) {
 // The position over the ground and the height are both infinite in float32; between two keys of
 // opposite sign there is none.
 TEST(ClipsRootMotion, HeightsBeyondFloat32) {
-  constexpr float far = 3.4e38f;
-  const Floats times{0, 0.004f, 0.0125f, 0.016f, 1};
-  const Floats moved{0, 0, 0, far, 0.75f * far, 0, -far, -0.75f * far, 0, 1, 1, 0, 2, 2, 0};
+  constexpr float far = 3.4028234e38f, beside = 0.75f * 1.00001f * far;
+  // The second of the bank's keys is halfway between the two.
+  const Floats times{0, 0.5f / 120, 1.5f / 120, 1.9f / 120, 1};
+  const Floats moved{0, 0,     0,       far, beside, 0,       -far, -beside,
+                     0, 1e37f, 7.5e36f, 0,   2e37f,  1.5e37f, 0};
   Skeleton skeleton;
   skeleton.nodes.resize(2);
   // Its inverse turns the axis upwards to (0.8, 0.6, 0).
