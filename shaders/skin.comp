@@ -12,7 +12,8 @@
 //   COMPARISON      the methods that are only for comparison
 //   TEXELS          for CPU devices: tables, meshes and palettes are read as uniform texel buffers, and one store writes an
 //                   attribute, or a whole vertex (needs scalar block layout and 64-bit integers)
-//   STAGED          whole vertices are gathered in shared memory, from which consecutive invocations store 16 bytes each
+//   STAGED          vertices are stored 16 or 8 bytes at a time where they begin at a multiple of that; others are gathered in shared
+//                   memory, from which consecutive invocations store 16 bytes each
 //   ONE_OUTPUT      all attributes go to one buffer, previous positions too; no results (4 storage buffers in all)
 
 #ifdef TEXELS

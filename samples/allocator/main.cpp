@@ -176,13 +176,13 @@ int main() {
   Allocator allocator(engine);
 
   InfluenceSet influences;
-  influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
-  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  influences.joints = attributeView(strip.joints[0], vertexCount, 2);
+  influences.weights = attributeView(strip.weights[0], vertexCount, 2);
   MeshView mesh;
   mesh.name = "strip";
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
-  mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
+  mesh.positions = attributeView(strip.positions[0], vertexCount, 3);
+  mesh.normals = attributeView(strip.normals[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
 
   vulkan::DeviceDescription device;
@@ -238,11 +238,9 @@ int main() {
       auto beginInfo =
           structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
       must(vkBeginCommandBuffer(engine.commandBuffer, &beginInfo));
-      context.recordBarrier(engine.commandBuffer,
-                            vulkan::barrierBetween(Use::vertexInput, Use::dermis));
+      context.recordBarrier(engine.commandBuffer, Use::vertexInput, Use::dermis);
       must(recorder.record(engine.commandBuffer));
-      context.recordBarrier(engine.commandBuffer,
-                            vulkan::barrierBetween(Use::dermis, Use::vertexInput | Use::hostRead));
+      context.recordBarrier(engine.commandBuffer, Use::dermis, Use::vertexInput | Use::hostRead);
       must(vkEndCommandBuffer(engine.commandBuffer));
       // [lost-frame]
       if (frame == lostFrame) {

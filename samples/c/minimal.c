@@ -107,11 +107,8 @@ int main(void) {
                                           .get_instance_proc_addr = vkGetInstanceProcAddr};
   dermis_context* context = NULL;
   must(dermis_context_create(&device_desc, NULL, NULL, &context, &error));
-  const dermis_recorder_desc recorder_desc = {
-      .size = sizeof recorder_desc,
-      .output_usage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT};
   dermis_recorder* recorder = NULL;
-  must(dermis_recorder_create(context, &recorder_desc, &recorder, &error));
+  must(dermis_recorder_create(context, NULL, &recorder, &error));
   dermis_scene* scene = dermis_recorder_scene(recorder);
 
   dermis_instance_desc figure = {.size = sizeof figure,

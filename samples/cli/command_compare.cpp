@@ -367,7 +367,7 @@ ExitStatus checkUsage(const CompareOptions& options) {
 }
 
 std::string poseName(const gltf::Model& model, std::uint32_t clip, double time) {
-  if (clip == gltf::none) return "rest pose";
+  if (clip == noIndex) return "rest pose";
   const std::string& name = model.clips[clip].name;
   return fmt::format("clip {}{} at {:.3f} s", clip,
                      name.empty() ? "" : " " + samples::inQuotes(name),

@@ -94,7 +94,7 @@ std::vector<JointMatrix> localTransforms(const gltf::Model& model, std::uint32_t
   std::vector<JointMatrix> locals;
   for (std::size_t node = 0; node < globals.size(); ++node) {
     glm::dmat4 local = matrixOf(globals[node]);
-    if (const std::uint32_t parent = model.nodes[node].parent; parent != gltf::none) {
+    if (const std::uint32_t parent = model.nodes[node].parent; parent != noIndex) {
       const glm::dmat4 above = matrixOf(globals[parent]);
       // Below a scale of 0 any transform gives the same.
       local = glm::determinant(above) != 0 ? glm::inverse(above) * local : glm::dmat4(1);

@@ -52,7 +52,7 @@ OutputMesh assemble(const Scene& scene, std::vector<SkinnedPart> skinned) {
       // glTF 2.0, 3.7.2.1: if there are no normals, tangents are ignored and both are computed.
       MeshView posed;
       posed.vertexCount = static_cast<std::uint32_t>(part.positions.size() / 3);
-      posed.positions = floatAttribute(part.positions.data(), posed.vertexCount, 3);
+      posed.positions = attributeView(part.positions.data(), posed.vertexCount, 3);
       part.normals = samples::must(smoothNormals(posed, from.primitive->triangles));
     }
   }

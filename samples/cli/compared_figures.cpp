@@ -79,12 +79,10 @@ Result<void> ComparedFigures::readBack() {
   const Result<void> copied = device_->device->run([&](VkCommandBuffer commandBuffer) {
     if (copies.empty()) return Result<void>();
     const samples::Device& device = *device_->device;
-    device_->context.recordBarrier(commandBuffer,
-                                   vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    device_->context.recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
     device.functions().CmdCopyBuffer(commandBuffer, output, buffer->handle(),
                                      static_cast<std::uint32_t>(copies.size()), copies.data());
-    device_->context.recordBarrier(commandBuffer,
-                                   vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    device_->context.recordBarrier(commandBuffer, Use::copyWrite, Use::hostRead);
     return Result<void>();
   });
   if (!copied) return copied;

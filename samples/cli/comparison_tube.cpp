@@ -54,8 +54,8 @@ struct Tube {
         joints.insert(joints.end(), {0, 1});
       }
     }
-    influences.joints = {joints.data(), rings * sides, 8, ComponentType::uint32, 2};
-    influences.weights = floatAttribute(weights.data(), rings * sides, 2);
+    influences.joints = attributeView(joints.data(), rings * sides, 2);
+    influences.weights = attributeView(weights.data(), rings * sides, 2);
   }
   Tube(const Tube&) = delete;
   Tube& operator=(const Tube&) = delete;
@@ -64,9 +64,9 @@ struct Tube {
     MeshView mesh;
     mesh.name = "tube";
     mesh.vertexCount = rings * sides;
-    mesh.positions = floatAttribute(positions.data(), mesh.vertexCount, 3);
+    mesh.positions = attributeView(positions.data(), mesh.vertexCount, 3);
     mesh.influenceSets = {&influences, 1};
-    mesh.centersOfRotation = floatAttribute(centers.data(), mesh.vertexCount, 3);
+    mesh.centersOfRotation = attributeView(centers.data(), mesh.vertexCount, 3);
     mesh.dualQuaternionWeight = static_cast<float>(shares.dualQuaternionWeight);
     mesh.bulgeStrength = static_cast<float>(shares.bulgeStrength);
     return mesh;

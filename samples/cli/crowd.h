@@ -11,7 +11,7 @@ namespace dermis::cli {
 
 /// The clip and phase of one figure.
 struct Role {
-  std::uint32_t clip = gltf::none;
+  std::uint32_t clip = noIndex;
   double phase = 0;  ///< seconds ahead of the first figure
 };
 

@@ -89,7 +89,6 @@ Result<void> DrawnScene::makeSystem(std::uint32_t figures) {
                  fmt::format("{} figures of {} {} each exceed the maximum of {}", figures, each,
                              what, std::numeric_limits<std::uint32_t>::max())};
   }
-  description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.scene.meshCapacity = {std::max<std::uint64_t>(meshes, 4096)};
   description.scene.jointCapacity = {std::max<std::uint64_t>(all, 1)};
   description.scene.outputCapacity = {std::max<std::uint64_t>(outputs * figures, 4096)};
@@ -243,11 +242,9 @@ Result<void> DrawnScene::placeFixed(const ScenePart& part, std::span<const Morph
 }
 
 Result<void> DrawnScene::recordSkinning(VkCommandBuffer commandBuffer) {
-  device_->context.recordBarrier(
-      commandBuffer, vulkan::barrierBetween(Use::vertexInput | Use::copyRead, Use::dermis));
+  device_->context.recordBarrier(commandBuffer, Use::vertexInput | Use::copyRead, Use::dermis);
   if (Result<void> done = recorder_->record(commandBuffer); !done) return done;
-  device_->context.recordBarrier(
-      commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput | Use::copyRead));
+  device_->context.recordBarrier(commandBuffer, Use::dermis, Use::vertexInput | Use::copyRead);
   return {};
 }
 

@@ -316,7 +316,7 @@ std::vector<std::byte> glbFile(const OutputMesh& mesh) {
   Json nodes = Json::array(), meshes = Json::array(), roots = Json::array();
   for (const OutputPart& part : mesh.parts) {
     Json primitive = putPrimitive(buffer, part);
-    if (part.primitive->material != gltf::none) {
+    if (part.primitive->material != noIndex) {
       primitive["material"] = materials.add(part.primitive->material);
     }
     roots.push_back(nodes.size());

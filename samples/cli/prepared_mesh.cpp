@@ -85,7 +85,7 @@ std::uint32_t NamedJoints::of(const gltf::Mesh& mesh) {
 MeshView PreparedMesh::view() const {
   MeshView mesh = repaired_ ? repaired_->view() : original_;
   if (!centersOfRotation_.empty())
-    mesh.centersOfRotation = floatAttribute(centersOfRotation_.data(), mesh.vertexCount, 3);
+    mesh.centersOfRotation = attributeView(centersOfRotation_.data(), mesh.vertexCount, 3);
   return mesh;
 }
 
@@ -202,12 +202,12 @@ class JoinedMesh {
         weights_[slot] = influences_[influence++].weight;
       }
     }
-    set_.joints = {joints_.data(), vertexCount, slots_ * 4, ComponentType::uint32, slots_};
-    set_.weights = floatAttribute(weights_.data(), vertexCount, slots_);
+    set_.joints = attributeView(joints_.data(), vertexCount, slots_);
+    set_.weights = attributeView(weights_.data(), vertexCount, slots_);
     MeshView mesh;
     mesh.name = name;
     mesh.vertexCount = vertexCount;
-    mesh.positions = floatAttribute(positions_.data(), vertexCount, 3);
+    mesh.positions = attributeView(positions_.data(), vertexCount, 3);
     mesh.influenceSets = {&set_, 1};
     return mesh;
   }

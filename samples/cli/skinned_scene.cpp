@@ -306,8 +306,8 @@ std::size_t fileOfClip(const Scene& scene, std::uint32_t clip) {
 
 Result<std::uint32_t> chooseClip(const Scene& scene, const std::optional<std::string>& wanted) {
   const gltf::Model& model = *scene.model;
-  if (!wanted) return model.clips.empty() ? gltf::none : 0u;
-  if (*wanted == "none") return gltf::none;
+  if (!wanted) return model.clips.empty() ? noIndex : 0u;
+  if (*wanted == "none") return noIndex;
   const std::optional<std::uint32_t> numbered = gltf::findClip(model, *wanted);
   const bool isNumber = numbered && std::to_string(*numbered) == *wanted;
   if (numbered && (isNumber || model.clips[*numbered].name != *wanted)) return *numbered;

@@ -313,7 +313,7 @@ std::string VerifiedCase::failure() const {
 }
 
 std::vector<PoseToVerify> posesToVerify(const gltf::Model& model) {
-  std::vector<PoseToVerify> poses{{gltf::none, 0, "rest pose"}};
+  std::vector<PoseToVerify> poses{{noIndex, 0, "rest pose"}};
   for (std::uint32_t clip = 0; clip < model.clips.size(); ++clip) {
     for (const double share : {0.0, 0.31, 0.77, 1.0}) {
       const double time = share * model.clips[clip].duration;

@@ -78,7 +78,7 @@ struct VerifiedCase {
 };
 
 struct PoseToVerify {
-  std::uint32_t clip = gltf::none;
+  std::uint32_t clip = noIndex;
   double time = 0;
   std::string name;
 };

@@ -261,9 +261,7 @@ class Crowd {
   /// Call it in each frame, before it is executed.
   void update(std::uint64_t frame) {
     comeAndGo(frame);
-    for (const Figure& figure : figures_) {
-      if (figure.isThere()) move(figure);
-    }
+    move();
     play();
   }
 
@@ -326,15 +324,25 @@ class Crowd {
   // [/crowd-add]
 
   // [crowd-move]
-  void move(const Figure& figure) {
-    for (const InstanceHandle instance : figure.instances) {
-      InstanceChange change;
-      change.instance = instance;
-      change.updateInterval = figure.now.updateInterval;
-      if (!options_->culledOnGpu) change.visible = figure.now.isInView;
-      change.teleports = figure.now.teleports;
-      must(scene_->change(change));
+  void move() {
+    visibility_.clear();
+    for (const Figure& figure : figures_) {
+      for (const InstanceHandle instance : figure.instances) {
+        const bool isVisible = figure.now.isInView || options_->culledOnGpu;
+        visibility_.push_back({instance, isVisible, figure.now.updateInterval});
+        if (figure.now.teleports) must(scene_->change({.instance = instance, .teleports = true}));
+      }
     }
+    must(scene_->setVisibility(visibility_));
+  }
+
+  /// Whether this frame may show a new pose of the figure. What the GPU culls may become visible
+  /// in any frame.
+  bool needsPose(const Figure& figure) const {
+    return options_->culledOnGpu ||
+           std::ranges::any_of(figure.instances, [&](InstanceHandle instance) {
+             return must(scene_->isDue(instance));
+           });
   }
 
   /// One call for all figures. The scene samples the poses of those that it skins.
@@ -343,7 +351,7 @@ class Crowd {
     plays_.clear();
     layers_.reserve(2 * figures_.size());  // plays point to them
     for (const Figure& figure : figures_) {
-      if (!figure.isThere()) continue;
+      if (!figure.isThere() || !needsPose(figure)) continue;
       const std::size_t first = layers_.size();
       character_->addLayers(figure.now.playing, layers_);
       plays_.push_back({figure.handle, std::span(layers_).subspan(first)});
@@ -359,8 +367,9 @@ class Crowd {
   ClipsHandle clips_;
   std::vector<MeshHandle> meshes_;  ///< by part
   std::vector<Figure> figures_;
-  std::vector<ClipLayer> layers_;  ///< of the frame
-  std::vector<FigurePlay> plays_;  ///< of the frame
+  std::vector<InstanceVisibility> visibility_;  ///< of the frame
+  std::vector<ClipLayer> layers_;               ///< of the frame
+  std::vector<FigurePlay> plays_;               ///< of the frame
   std::uint64_t refusals_ = 0;
 };
 
@@ -394,10 +403,10 @@ void skinFrame(vulkan::SceneRecorder& recorder, Crowd& crowd, std::uint64_t fram
 
   // The check copies the vertices. An engine that draws in each frame uses `Use::vertexInput` in
   // both barriers.
-  open.context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyRead, Use::dermis));
+  open.context.recordBarrier(commandBuffer, Use::copyRead, Use::dermis);
   must(recorder.record(commandBuffer, description));
   const Use use = options.picture.empty() ? Use::copyRead : Use::copyRead | Use::vertexInput;
-  open.context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, use));
+  open.context.recordBarrier(commandBuffer, Use::dermis, use);
 }
 // [/crowd-frame]
 
@@ -596,7 +605,7 @@ void recordReadBack(Device& device, VkCommandBuffer commandBuffer,
   const VkBufferCopy region{0, 0, size};
   device.functions().CmdCopyBuffer(commandBuffer, recorder.outputBuffer(), readBack.buffer.handle(),
                                    1, &region);
-  recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+  recordBarrier(device, commandBuffer, Use::copyWrite, Use::hostRead);
 }
 
 /// The parts of the figures in view, in the world.
@@ -697,7 +706,7 @@ ExitStatus playOnCpu(const Character& character, const PackedClips& clips, const
     const auto begin = Clock::now();
     const std::span<const cpu::PlannedJob> jobs = must(runner.jobs());
     const auto planned = Clock::now();
-    inParallel(jobs.size(), [&](std::size_t index) { cpu::skin(jobs[index]); });
+    inParallel(jobs.size(), [&](std::size_t index) { cpu::run(jobs[index]); });
     const std::chrono::duration<double> planning = planned - begin,
                                         skinning = Clock::now() - planned;
 

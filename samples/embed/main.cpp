@@ -186,13 +186,13 @@ int main() {
   const Engine engine = makeEngine();
 
   InfluenceSet influences;
-  influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
-  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  influences.joints = attributeView(strip.joints[0], vertexCount, 2);
+  influences.weights = attributeView(strip.weights[0], vertexCount, 2);
   MeshView mesh;
   mesh.name = "strip";
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
-  mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
+  mesh.positions = attributeView(strip.positions[0], vertexCount, 3);
+  mesh.normals = attributeView(strip.normals[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
 
   // [set-up]
@@ -257,10 +257,10 @@ int main() {
     std::ranges::copy(std::as_bytes(std::span(matrices)), poses.bytes().begin());
     must(writeTables(plan, tables.bytes()));
     // The engine records the barriers around `record`: only it knows how else it uses the buffers.
-    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
+    context.recordBarrier(engine.commandBuffer, Use::dermis, Use::dermis);
     must(context.record(engine.commandBuffer, plan, bindings));
     // This program reads the vertices on the CPU. To draw them, use `Use::vertexInput`.
-    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
+    context.recordBarrier(engine.commandBuffer, Use::dermis, Use::hostRead);
     // [/frame]
     must(vkEndCommandBuffer(engine.commandBuffer));
     submit(engine);

@@ -221,13 +221,13 @@ int main() {
   const Engine engine = makeEngine();
 
   InfluenceSet influences;
-  influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
-  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  influences.joints = attributeView(strip.joints[0], vertexCount, 2);
+  influences.weights = attributeView(strip.weights[0], vertexCount, 2);
   MeshView mesh;
   mesh.name = "strip";
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
-  mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
+  mesh.positions = attributeView(strip.positions[0], vertexCount, 3);
+  mesh.normals = attributeView(strip.normals[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
 
   vulkan::DeviceDescription device;
@@ -240,7 +240,6 @@ int main() {
 
   // -- Dermis: while loading. The engine creates the buffer of the poses and passes it to Dermis.
   vulkan::SceneRecorderDescription description;
-  description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.scene.gpuJointCapacity = Capacity::fixed(std::uint64_t{figureCount} * jointCount);
   const BufferRequirement needed =
       must(vulkan::SceneRecorder::requirement(context, description, BufferRole::gpuPoses));
@@ -274,16 +273,12 @@ int main() {
     must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
     // [frame]
     // The previous frame may still read the poses.
-    context.recordBarrier(engine.commandBuffer,
-                          vulkan::barrierBetween(Use::dermis, Use::computeWrite));
+    context.recordBarrier(engine.commandBuffer, Use::dermis, Use::computeWrite);
     animation.record(engine.commandBuffer, static_cast<float>(frame));
     must(scene.markAllWritten());
-    context.recordBarrier(
-        engine.commandBuffer,
-        vulkan::barrierBetween(Use::computeWrite | Use::vertexInput, Use::dermis));
+    context.recordBarrier(engine.commandBuffer, Use::computeWrite | Use::vertexInput, Use::dermis);
     must(recorder.record(engine.commandBuffer));
-    context.recordBarrier(engine.commandBuffer,
-                          vulkan::barrierBetween(Use::dermis, Use::vertexInput));
+    context.recordBarrier(engine.commandBuffer, Use::dermis, Use::vertexInput);
     // [/frame]
     // An engine draws here.
     must(vkEndCommandBuffer(engine.commandBuffer));
@@ -298,12 +293,11 @@ int main() {
   const Buffer matrices = makeBuffer(engine, needed.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, mapped);
   auto begin = structure<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   must(vkBeginCommandBuffer(engine.commandBuffer, &begin));
-  context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+  context.recordBarrier(engine.commandBuffer, Use::dermis, Use::copyRead);
   const VkBufferCopy allVertices{0, 0, outputSize}, allPoses{0, 0, needed.size};
   vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), vertices.buffer, 1, &allVertices);
   vkCmdCopyBuffer(engine.commandBuffer, poses.buffer, matrices.buffer, 1, &allPoses);
-  context.recordBarrier(engine.commandBuffer,
-                        vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+  context.recordBarrier(engine.commandBuffer, Use::copyWrite, Use::hostRead);
   must(vkEndCommandBuffer(engine.commandBuffer));
   submit(engine);
   std::uint32_t right = 0;

@@ -111,10 +111,10 @@ Result<std::vector<std::byte>> DeviceBuffer::read() const {
       MappedBuffer::create(device, buffer_.size(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
   if (!copy) return copy.error();
   const Result<void> done = device.run([&](VkCommandBuffer commandBuffer) -> Result<void> {
-    recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    recordBarrier(device, commandBuffer, Use::dermis, Use::copyRead);
     const VkBufferCopy all{0, 0, buffer_.size()};
     device.functions().CmdCopyBuffer(commandBuffer, buffer_.handle(), copy->handle(), 1, &all);
-    recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    recordBarrier(device, commandBuffer, Use::copyWrite, Use::hostRead);
     return {};
   });
   if (!done) return done.error();

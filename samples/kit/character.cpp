@@ -42,14 +42,14 @@ Result<Character> Character::load(const std::filesystem::path& path,
                       fmt::format("{}: it needs more memory than the limit for a file of this size",
                                   inQuotes(path.filename().string()))};
   std::vector<std::uint32_t>& skins = character.skins_;
-  std::vector<std::uint32_t> numbers(model.skins.size(), gltf::none);
+  std::vector<std::uint32_t> numbers(model.skins.size(), noIndex);
   for (const gltf::SkinnedPrimitive& source : model.skinnedPrimitives) {
     const gltf::Primitive& primitive = model.meshes[source.mesh].primitives[source.primitive];
     if (primitive.influences.empty()) continue;
     if (!spendOnPart(primitive, character.model_->memoryLeft)) return tooMuch;
     const auto jointCount = static_cast<std::uint32_t>(model.skins[source.skin].joints.size());
     std::uint32_t& skin = numbers[source.skin];
-    if (skin == gltf::none) {
+    if (skin == noIndex) {
       skin = static_cast<std::uint32_t>(skins.size());
       skins.push_back(source.skin);
       character.jointCounts_.push_back(jointCount);
@@ -86,7 +86,7 @@ bool Character::sampleClip(std::uint32_t clip, std::span<const std::uint32_t> sk
     return false;
   for (std::uint32_t tick = 0; tick < sampled.tickCount; ++tick) {
     const std::vector<Transform> globals =
-        gltf::nodeGlobals(*model_, isRest ? gltf::none : clip, duration * tick / sampled.tickCount);
+        gltf::nodeGlobals(*model_, isRest ? noIndex : clip, duration * tick / sampled.tickCount);
     for (const std::uint32_t skin : skins)
       sampled.poses.push_back(gltf::pose(*model_, skin, globals));
   }

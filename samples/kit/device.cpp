@@ -465,8 +465,8 @@ std::string driverVersion(const Device& device) {
   return std::string(driver.driverName) + " " + driver.driverInfo;
 }
 
-void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Barrier& barrier) {
+void recordBarrier(const Device& device, VkCommandBuffer commandBuffer, Use before, Use after) {
+  const vulkan::Barrier barrier = vulkan::barrierBetween(before, after);
   const VkMemoryBarrier memory = barrier;
   device.functions().CmdPipelineBarrier(commandBuffer, barrier.sourceStages,
                                         barrier.destinationStages, 0, 1, &memory, 0, nullptr, 0,

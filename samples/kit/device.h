@@ -138,9 +138,8 @@ Result<OpenDevice> openDevice(const DeviceOptions& options);
 /// a number if the driver does not report more.
 std::string driverVersion(const Device& device);
 
-/// A global memory barrier.
-void recordBarrier(const Device& device, VkCommandBuffer commandBuffer,
-                   const vulkan::Barrier& barrier);
+/// `vulkan::barrierBetween(before, after)` for all memory.
+void recordBarrier(const Device& device, VkCommandBuffer commandBuffer, Use before, Use after);
 
 /// The error of a Vulkan function.
 Error vulkanError(const std::string& function, VkResult result);

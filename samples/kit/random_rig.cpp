@@ -78,8 +78,8 @@ void addMethodInputs(OwnedMesh& mesh, Random random) {
 
 AttributeView vectors(const std::vector<float>& values, std::uint32_t components) {
   if (values.empty()) return {};
-  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
-                        components);
+  return attributeView(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                       components);
 }
 
 }  // namespace
@@ -93,7 +93,7 @@ MeshView OwnedMesh::view() {
   mesh.tangents = vectors(tangents, 4);
   set.joints = {joints.data(), vertexCount(), influencesPerVertex * 4, ComponentType::uint32,
                 influencesPerVertex};
-  set.weights = floatAttribute(weights.data(), vertexCount(), influencesPerVertex);
+  set.weights = attributeView(weights.data(), vertexCount(), influencesPerVertex);
   mesh.influenceSets = {&set, 1};
   mesh.dualQuaternionWeights = vectors(dualQuaternionWeights, 1);
   mesh.bulgeStrengths = vectors(bulgeStrengths, 1);

@@ -54,11 +54,11 @@ Result<void> TimedBatches::record(TimedBatch& batch) {
   begin.flags = VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT;
   batch.commandBuffer = device_->allocateCommandBuffer();
   functions.BeginCommandBuffer(batch.commandBuffer, &begin);
-  context_->recordBarrier(batch.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
+  context_->recordBarrier(batch.commandBuffer, Use::dermis, Use::dermis);
   timestamps_.recordBegin(batch.commandBuffer);
   const Result<void> done = context_->record(batch.commandBuffer, batch.plan, *batch.bindings);
   timestamps_.recordEnd(batch.commandBuffer);
-  context_->recordBarrier(batch.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
+  context_->recordBarrier(batch.commandBuffer, Use::dermis, Use::hostRead);
   functions.EndCommandBuffer(batch.commandBuffer);
   return done;
 }

@@ -50,9 +50,9 @@ void fill(const BatchLayout& layout, const Buffers& buffers) {
 Result<void> submit(Device& device, const vulkan::Context& context, const Plan& plan,
                     const vulkan::Bindings& bindings) {
   return device.run([&](VkCommandBuffer commandBuffer) {
-    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
+    context.recordBarrier(commandBuffer, Use::dermis, Use::dermis);
     Result<void> done = context.record(commandBuffer, plan, bindings);
-    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::hostRead));
+    context.recordBarrier(commandBuffer, Use::dermis, Use::hostRead);
     return done;
   });
 }
@@ -134,11 +134,11 @@ constexpr std::array<Tuning, 4> tunings{{{64, 4}, {8, 1}, {32, 3}, {128, 16}}};
 PackedMesh pointMesh() {
   constexpr std::array<float, 3> place{0, 0, 0};
   constexpr float joint = 0, weight = 1;
-  const InfluenceSet influences{floatAttribute(&joint, 1, 1), floatAttribute(&weight, 1, 1)};
+  const InfluenceSet influences{attributeView(&joint, 1, 1), attributeView(&weight, 1, 1)};
   MeshView mesh;
   mesh.name = "point";
   mesh.vertexCount = 1;
-  mesh.positions = floatAttribute(place.data(), 1, 3);
+  mesh.positions = attributeView(place.data(), 1, 3);
   mesh.influenceSets = {&influences, 1};
   return must(pack(mesh, 1));
 }
@@ -177,14 +177,14 @@ std::vector<std::vector<std::byte>> runFrame(Device& device, const vulkan::Conte
   must(recorder.scene().beginFrame(1, 0));
   must(device.run([&](VkCommandBuffer commandBuffer) -> Result<void> {
     if (Result<void> recorded = recorder.record(commandBuffer); !recorded) return recorded;
-    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    context.recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
     std::uint64_t offset = 0;
     for (const vulkan::BufferRange& range : ranges) {
       const VkBufferCopy region{range.offset, offset, range.size};
       device.functions().CmdCopyBuffer(commandBuffer, range.buffer, copy.handle(), 1, &region);
       offset += range.size;
     }
-    context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    context.recordBarrier(commandBuffer, Use::copyWrite, Use::hostRead);
     return {};
   }));
   std::vector<std::vector<std::byte>> contents;

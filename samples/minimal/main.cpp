@@ -131,13 +131,13 @@ int main() {
   // -- Dermis: while loading.
   // [mesh]
   InfluenceSet influences;
-  influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
-  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  influences.joints = attributeView(strip.joints[0], vertexCount, 2);
+  influences.weights = attributeView(strip.weights[0], vertexCount, 2);
   MeshView mesh;
   mesh.name = "strip";
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
-  mesh.normals = floatAttribute(strip.normals[0], vertexCount, 3);
+  mesh.positions = attributeView(strip.positions[0], vertexCount, 3);
+  mesh.normals = attributeView(strip.normals[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
   // [/mesh]
 
@@ -149,9 +149,7 @@ int main() {
   device.getInstanceProcAddr = vkGetInstanceProcAddr;
   device.apiVersion = VK_API_VERSION_1_1;
   vulkan::Context context = must(vulkan::Context::create(device));
-  vulkan::SceneRecorderDescription description;
-  description.outputUsage = VK_BUFFER_USAGE_VERTEX_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
-  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context, description));
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
   Scene& scene = recorder.scene();
 
   InstanceDescription figure;
@@ -159,7 +157,7 @@ int main() {
   figure.pose = must(scene.addPose(2));
   figure.layout = {.positions = VertexFormat::float32x3, .normals = VertexFormat::float32x3};
   must(recorder.prepare(figure));
-  const InstanceHandle instance = must(scene.addInstance(figure));
+  const auto instance = must(scene.addInstance(figure));
   // [/load]
 
   // -- Each frame.
@@ -175,15 +173,14 @@ int main() {
     // `frame - 1`: the newest frame that the GPU has completed. This program waits for each.
     must(scene.beginFrame(frame, frame - 1));
     std::copy(pose.begin(), pose.end(), must(scene.writePose(figure.pose)).begin());
-    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::copyRead, Use::dermis));
+    context.recordBarrier(engine.commandBuffer, Use::copyRead, Use::dermis);
     must(recorder.record(engine.commandBuffer));
-    context.recordBarrier(engine.commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    context.recordBarrier(engine.commandBuffer, Use::dermis, Use::copyRead);
     // [/frame]
     // An engine draws here. This program copies the vertices to compare them.
     const VkBufferCopy copy{must(scene.output(instance)).offset, 0, vertexCount * 24};
     vkCmdCopyBuffer(engine.commandBuffer, recorder.outputBuffer(), engine.readBack, 1, &copy);
-    context.recordBarrier(engine.commandBuffer,
-                          vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    context.recordBarrier(engine.commandBuffer, Use::copyWrite, Use::hostRead);
     must(vkEndCommandBuffer(engine.commandBuffer));
     auto submit = structure<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
     submit.commandBufferCount = 1;

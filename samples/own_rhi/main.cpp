@@ -73,6 +73,7 @@ class Rhi {
   void begin();
   void submit();
   VkDescriptorSet allocateSet();
+  void write(VkDescriptorSet set, std::uint32_t slot, const VkDescriptorBufferInfo& part);
 
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physicalDevice = VK_NULL_HANDLE;
@@ -241,6 +242,16 @@ VkDescriptorSet Rhi::allocateSet() {
   return set;
 }
 
+void Rhi::write(VkDescriptorSet set, std::uint32_t slot, const VkDescriptorBufferInfo& part) {
+  auto write = structure<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
+  write.dstSet = set;
+  write.dstBinding = slot;
+  write.descriptorCount = 1;
+  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  write.pBufferInfo = &part;
+  vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
+}
+
 // -- What a scene needs of it.
 
 // [executor]
@@ -272,32 +283,23 @@ struct Executor {
 
 void Executor::execute(std::span<const Command> commands) {
   const VkCommandBuffer to = rhi.commandBuffer;
+  const auto buffer = [&](std::uint32_t number) { return buffers.at(number).buffer; };
   for (const Command& command : commands) {
     std::visit(
         Overloaded{
             [&](const DispatchCommand& dispatch) {
               const VkDescriptorSet set = rhi.allocateSet();
-              for (const Binding& binding : dispatch.bindings) {
-                const VkDescriptorBufferInfo buffer{buffers.at(binding.part.buffer).buffer,
-                                                    binding.part.offset, binding.part.size};
-                auto write =
-                    structure<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
-                write.dstSet = set;
-                write.dstBinding = binding.slot;
-                write.descriptorCount = 1;
-                write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-                write.pBufferInfo = &buffer;
-                vkUpdateDescriptorSets(rhi.device, 1, &write, 0, nullptr);
-              }
+              for (const auto& [slot, isTexelBuffer, part] : dispatch.bindings)
+                rhi.write(set, slot, {buffer(part.buffer), part.offset, part.size});
               vkCmdBindPipeline(to, VK_PIPELINE_BIND_POINT_COMPUTE,
                                 pipelines.at(dispatch.pipeline));
               vkCmdBindDescriptorSets(to, VK_PIPELINE_BIND_POINT_COMPUTE, rhi.layout, 0, 1, &set, 0,
                                       nullptr);
               vkCmdPushConstants(to, rhi.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                                  dispatch.constantCount * 4, dispatch.constants.data());
-              if (dispatch.indirectOffset) {
-                const std::uint32_t arguments = dispatch.bindings.front().part.buffer;
-                vkCmdDispatchIndirect(to, buffers.at(arguments).buffer, *dispatch.indirectOffset);
+              if (dispatch.indirect.size != 0) {
+                vkCmdDispatchIndirect(to, buffer(dispatch.indirect.buffer),
+                                      dispatch.indirect.offset);
               } else {
                 vkCmdDispatch(to, dispatch.groupCountX, dispatch.groupCountY, 1);
               }
@@ -307,16 +309,14 @@ void Executor::execute(std::span<const Command> commands) {
                   rhi.createBuffer(upload.to.size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
               std::ranges::copy(upload.bytes, from.mapped);
               const VkBufferCopy region{0, upload.to.offset, upload.to.size};
-              vkCmdCopyBuffer(to, from.buffer, buffers.at(upload.to.buffer).buffer, 1, &region);
+              vkCmdCopyBuffer(to, from.buffer, buffer(upload.to.buffer), 1, &region);
             },
             [&](const CopyCommand& copy) {
               const VkBufferCopy region{copy.fromOffset, copy.toOffset, copy.size};
-              vkCmdCopyBuffer(to, buffers.at(copy.from).buffer, buffers.at(copy.to).buffer, 1,
-                              &region);
+              vkCmdCopyBuffer(to, buffer(copy.from), buffer(copy.to), 1, &region);
             },
             [&](const ClearCommand& clear) {
-              vkCmdFillBuffer(to, buffers.at(clear.part.buffer).buffer, clear.part.offset,
-                              clear.part.size, 0);
+              vkCmdFillBuffer(to, buffer(clear.part.buffer), clear.part.offset, clear.part.size, 0);
             },
             [&](const BarrierCommand& barrier) {
               const vulkan::Barrier between = vulkan::barrierBetween(barrier.before, barrier.after);
@@ -357,11 +357,11 @@ int main() {
   }
   InfluenceSet influences;
   influences.joints = {strip.joints, vertexCount, 2, ComponentType::uint8, 2};
-  influences.weights = floatAttribute(strip.weights[0], vertexCount, 2);
+  influences.weights = attributeView(strip.weights[0], vertexCount, 2);
   MeshView mesh;
   mesh.name = "strip";
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(strip.positions[0], vertexCount, 3);
+  mesh.positions = attributeView(strip.positions[0], vertexCount, 3);
   mesh.influenceSets = {&influences, 1};
 
   // [load]

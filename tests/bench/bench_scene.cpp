@@ -78,7 +78,7 @@ BenchScene::BenchScene(samples::OpenDevice& open, std::span<const samples::SkinR
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   device.functions().BeginCommandBuffer(commandBuffer_, &begin);
-  open.context.recordBarrier(commandBuffer_, vulkan::barrierBetween(Use::dermis, Use::dermis));
+  open.context.recordBarrier(commandBuffer_, Use::dermis, Use::dermis);
   orStop(open.context.record(commandBuffer_, plan_, *bindings_));
   device.functions().EndCommandBuffer(commandBuffer_);
   // The first time drivers compile, and memory is touched.

@@ -79,17 +79,17 @@ PackedMesh packWhole(const samples::Crowd& crowd) {
   for (std::uint32_t number = 0; number < morphTargets; ++number) {
     MorphTargetView& target = targets[number];
     target.vertices = std::span(vertices).subspan((count - size) / morphTargets * number, size);
-    target.positions = floatAttribute(displacements[0].data(), size, 3);
+    target.positions = attributeView(displacements[0].data(), size, 3);
     target.normals = target.positions;
   }
   const AttributeView joints{first.joints.data(), count, sizeof(first), ComponentType::uint16, 4};
-  const InfluenceSet set{joints, floatAttribute(first.weights.data(), count, 4, sizeof(first))};
+  const InfluenceSet set{joints, attributeView(first.weights.data(), count, 4, sizeof(first))};
   MeshView view;
   view.vertexCount = count;
-  view.positions = floatAttribute(first.position.data(), count, 3, sizeof(first));
-  view.normals = floatAttribute(first.normal.data(), count, 3, sizeof(first));
-  view.tangents = floatAttribute(tangents.data(), count, 4);
-  view.centersOfRotation = floatAttribute(centers.data(), count, 3);
+  view.positions = attributeView(first.position.data(), count, 3, sizeof(first));
+  view.normals = attributeView(first.normal.data(), count, 3, sizeof(first));
+  view.tangents = attributeView(tangents.data(), count, 4);
+  view.centersOfRotation = attributeView(centers.data(), count, 3);
   view.influenceSets = {&set, 1};
   view.morphTargets = targets;
   return must(pack(view, crowd.jointCount()));

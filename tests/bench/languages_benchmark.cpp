@@ -65,7 +65,7 @@ int main(int count, char** words) {
   for (std::uint64_t frame = 1; frame <= static_cast<std::uint64_t>(frameCount); ++frame) {
     for (std::size_t i = 0; i < figures.size(); ++i) {
       const double time = static_cast<double>(frame) / 30 + duration * figures[i].offset;
-      poses[i] = gltf::pose(model, figures[i].skin, model.clips.empty() ? gltf::none : 0,
+      poses[i] = gltf::pose(model, figures[i].skin, model.clips.empty() ? noIndex : 0,
                             duration > 0 ? std::fmod(time, duration) : 0);
     }
     const auto begin = std::chrono::steady_clock::now();
@@ -77,7 +77,7 @@ int main(int count, char** words) {
     threads.clear();
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) {
       threads.emplace_back([&] {
-        for (std::size_t job = next++; job < jobs.size(); job = next++) cpu::skin(jobs[job]);
+        for (std::size_t job = next++; job < jobs.size(); job = next++) cpu::run(jobs[job]);
       });
     }
     for (std::thread& thread : threads) thread.join();

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,6 +38,10 @@ class CClipsTest : public ::testing::Test {
     EXPECT_EQ(info.byte_count, same.bytes().size());
     EXPECT_TRUE(isSame(info.bytes, same.bytes().data(), same.bytes().size()));
     EXPECT_EQ(info.worst_error, report.worstError);
+    EXPECT_EQ(info.max_error, report.maxError);
+    EXPECT_EQ(info.slowest_rate, report.slowestRate);
+    EXPECT_EQ(info.fastest_rate, report.fastestRate);
+    EXPECT_EQ(info.key_count, report.keyCount);
     EXPECT_EQ(info.worst, report.worst);
     return same;
   }
@@ -419,6 +426,21 @@ TEST_F(CClipsTest, FiguresPlay) {
   std::memcpy(&second[1].figure, &first, sizeof(first));
   expectError(dermis_play_clips(scene, second.data(), 2, &error),
               "entry 1: figure: this is the handle of a pose");
+  // The first wrong entry is named, whether the scene or the C interface finds what is wrong.
+  const auto expectFirst = [&](std::span<const dermis_play> entries, const char* message) {
+    expectError(dermis_play_clips(scene, entries.data(), static_cast<std::uint32_t>(entries.size()),
+                                  &error),
+                message);
+  };
+  dermis_clip_layer infinite = layers[0];
+  infinite.weight = std::numeric_limits<float>::infinity();
+  const dermis_play heavy{figures[2], 1, &infinite}, missing{figures[2], 1, nullptr};
+  expectFirst(std::array{plays[1], heavy, plays[0], second[1]},
+              "entry 1: layer 0: its weight is not");
+  expectFirst(std::array{plays[1], plays[0], missing, heavy}, "entry 2: layers is null");
+  expectFirst(std::array{plays[1], second[1], heavy},
+              "entry 1: figure: this is the handle of a pose");
+  expectFirst(std::array{missing, heavy}, "entry 0: layers is null");
   expectError(dermis_remove_clips(scene, clipsOfScene, &error), "is used by 3 figures");
   expectError(dermis_remove_figure(scene, figures[0], &error), "is used by 1 instance");
   expectError(dermis_figure_pose(scene, figures[0], 1, &desc.pose, &error), "has no skin 1");

@@ -90,7 +90,7 @@ struct Twins {
   }
   /// Runs the jobs of both, and compares all instances, and the lists.
   void run() {
-    for (const cpu::PlannedJob& job : *same.jobs(16)) cpu::skin(job);
+    for (const cpu::PlannedJob& job : *same.jobs(16)) cpu::run(job);
     dermis_runner_frame jobs = sized<dermis_runner_frame>();
     expectOk(dermis_runner_jobs(runner, 16, &jobs, &error));
     for (std::uint32_t job = 0; job < jobs.job_count; ++job)
@@ -477,8 +477,9 @@ void expectCommands(std::span<const dermis_command> commands, std::span<const Co
       EXPECT_EQ(found.pipeline, static_cast<std::uint64_t>(dispatch->pipeline));
       EXPECT_EQ(found.group_count_x, dispatch->groupCountX);
       EXPECT_EQ(found.group_count_y, dispatch->groupCountY);
-      EXPECT_EQ(found.is_indirect, dispatch->indirectOffset ? 1u : 0u);
-      EXPECT_EQ(found.indirect_offset, dispatch->indirectOffset.value_or(0));
+      EXPECT_EQ(found.indirect.byte_count, dispatch->indirect.size);
+      EXPECT_EQ(found.indirect.offset, dispatch->indirect.offset);
+      EXPECT_EQ(found.indirect.buffer, dispatch->indirect.buffer);
       ASSERT_EQ(found.constant_count, dispatch->constantCount);
       EXPECT_TRUE(isSame(found.constants, dispatch->constants.data(), 4 * found.constant_count));
       ASSERT_EQ(found.binding_count, dispatch->bindings.size());
@@ -990,7 +991,7 @@ TEST(CModelTest, IsThatOfCpp) {
     for (const std::uint32_t clip : {0u, static_cast<std::uint32_t>(DERMIS_REST_POSE)}) {
       expectOk(dermis_model_pose(model, i, clip, 0.3, joints.data(), primitive.joint_count, nullptr,
                                  0, &error));
-      const auto pose = gltf::pose(expected, skinned.skin, clip == 0 ? 0 : gltf::none, 0.3);
+      const auto pose = gltf::pose(expected, skinned.skin, clip == 0 ? 0 : noIndex, 0.3);
       EXPECT_TRUE(isSame(joints.data(), pose.data(), joints.size() * sizeof(dermis_joint)));
     }
     expectError(dermis_model_pose(model, i, 0, 0, joints.data(), primitive.joint_count - 1, nullptr,

@@ -154,10 +154,10 @@ struct LineMesh {
       joints.insert(joints.end(), {vertex % jointCount, (vertex + 1) % jointCount});
     }
     set = {{joints.data(), vertexCount, 8, ComponentType::uint32, 2},
-           floatAttribute(weights.data(), vertexCount, 2)};
+           attributeView(weights.data(), vertexCount, 2)};
     view.name = "Fox";
     view.vertexCount = vertexCount;
-    view.positions = floatAttribute(positions.data(), vertexCount, 3);
+    view.positions = attributeView(positions.data(), vertexCount, 3);
     view.influenceSets = {&set, 1};
   }
   LineMesh(const LineMesh&) = delete;

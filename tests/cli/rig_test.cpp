@@ -52,9 +52,9 @@ class RigTest : public ::testing::Test {
     const auto rig = gltf::applyRig(model, 0, text);
     EXPECT_TRUE(rig.ok()) << rig.error().message;
     const Result<PackedRig> packed = packRig(**rig);
-    std::vector<JointMatrix> pose = gltf::pose(model, 0, gltf::none, 0);
+    std::vector<JointMatrix> pose = gltf::pose(model, 0, noIndex, 0);
     const std::vector<JointMatrix> written = pose;
-    std::vector<float> given = gltf::morphWeights(model, 0, gltf::none, 0);
+    std::vector<float> given = gltf::morphWeights(model, 0, noIndex, 0);
     std::vector<MorphWeight> morphs;
     for (std::uint32_t i = 0; i < given.size(); ++i) morphs.push_back({i, given[i]});
     const auto first = static_cast<std::uint32_t>(given.size());

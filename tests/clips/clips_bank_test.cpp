@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <random>
 #include <span>
@@ -271,6 +272,64 @@ TEST_F(ClipsBank, MasksAreFrom0To1) {
     other.words()[masks] = std::bit_cast<std::uint32_t>(factor);
     other.seal();
     expectRefused(other.bytes());
+  }
+}
+
+/// A bank with another rotation as 4 words from this one on.
+Blob withRotation(const PackedClips& bank, std::size_t word, const std::array<float, 4>& rotation) {
+  Blob blob(bank.bytes());
+  for (std::size_t i = 0; i < 4; ++i)
+    blob.words()[word + i] = std::bit_cast<std::uint32_t>(rotation[i]);
+  blob.seal();
+  return blob;
+}
+
+// `rigidSkins` looks at scales only.
+TEST_F(ClipsBank, RotationsHaveUnitLength) {
+  const ClipBank words(bank());
+  std::vector<std::size_t> places;  // at rest, and constant ones of clips
+  for (std::size_t i = 0; i < words.header.nodeCount; ++i)
+    places.push_back(words.header.nodes + i * ClipBank::wordsOf<BankNode> +
+                     offsetof(BankNode, rotation) / 4);
+  for (std::size_t clip = 0; clip < words.header.clipCount; ++clip) {
+    for (std::size_t node = 0; node < words.header.nodeCount; ++node) {
+      const std::uint32_t word = words.words[words.clip(clip).tracks + 3 * node + 1];
+      if (static_cast<TrackKind>(word >> 30) == TrackKind::constant)
+        places.push_back(word & 0x3fffffff);
+    }
+  }
+  EXPECT_GT(places.size(), words.header.nodeCount);
+  constexpr float infinite = std::numeric_limits<float>::infinity();
+  for (const std::size_t place : places) {
+    SCOPED_TRACE(place);
+    using Rotation = std::array<float, 4>;
+    for (const Rotation& good : {Rotation{0, 0, 0, -1}, Rotation{0.6f, 0, 0.8f, 0},
+                                 Rotation{0, 1.000004f, 0, 0}, Rotation{0.5f, 0.5f, -0.5f, 0.5f}})
+      EXPECT_TRUE(PackedClips::fromBytes(withRotation(bank(), place, good).bytes()).ok());
+    for (const Rotation& bad :
+         {Rotation{2, 0, 0, 0}, Rotation{0, 0, 0, 0}, Rotation{0, 0, 1e-22f, 0},
+          Rotation{0, 0.9999f, 0, 0}, Rotation{0, 0, 0, 1.0001f}, Rotation{0, 0, 0, 1e30f},
+          Rotation{infinite, 0, 0, 0}, Rotation{0, 0, 0, std::nanf("")}})
+      expectRefused(withRotation(bank(), place, bad).bytes());
+  }
+}
+
+// Whatever the length of a skeleton's rotation, the bank that it is packed into can be read.
+TEST_F(ClipsBank, RotationsOfSkeletonsGetUnitLength) {
+  for (const double length : {1e-320, 1e-161, 1e-155, 1e-30, 1e30, 1e150, 1e200}) {
+    SCOPED_TRACE(length);
+    PackedRig rig(armRig());
+    rig.skeleton.nodes[arm::body].rotation = {0, 0.36 * length, 0.48 * length, 0.8 * length};
+    const Result<PackedClips> packed = rig.tryToPack();
+    ASSERT_TRUE(packed.ok()) << packed.error().message;
+    const Result<PackedClips> copy = PackedClips::fromBytes(packed->bytes());
+    EXPECT_TRUE(copy.ok()) << copy.error().message;
+    const ClipBank words(*packed);
+    for (std::size_t i = 0; i < words.header.nodeCount; ++i) {
+      double square = 0;
+      for (const float number : words.node(i).rotation) square += double{number} * double{number};
+      EXPECT_NEAR(square, 1, 1e-6);
+    }
   }
 }
 

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -31,7 +34,7 @@ namespace {
 using glm::dvec3;
 using glm::dvec4;
 
-/// The positions by linear blending, and how far off each may be by the bounds of the joints: a
+/// The positions by linear blending, and how far off each may be by the bounds of its joints: a
 /// blend is at most as far off as the joint that is farthest off.
 struct BankPositions {
   std::vector<dvec3> positions;
@@ -57,6 +60,15 @@ std::vector<MorphWeight> morphsOf(const gltf::Model& model, const gltf::SkinnedP
   return morphs;
 }
 
+template <typename Stored>
+Stored component(const AttributeView& view, std::uint32_t element, std::uint32_t number) {
+  Stored value;
+  const auto* const bytes =
+      static_cast<const std::byte*>(view.data) + std::size_t{element} * view.stride;
+  std::memcpy(&value, bytes + number * sizeof(Stored), sizeof(Stored));
+  return value;
+}
+
 void addPrimitive(const PackedRig& rig, const gltf::SkinnedPrimitive& part,
                   std::span<const ClipLayer> layers, BankPositions& result) {
   const SkeletonSkin& skin = rig.skeleton.skins[part.skin];
@@ -64,7 +76,7 @@ void addPrimitive(const PackedRig& rig, const gltf::SkinnedPrimitive& part,
   const RepairedMesh mesh =
       must(repair(view.mesh(), static_cast<std::uint32_t>(skin.joints.size())));
   const std::vector<MorphWeight> morphs =
-      layers.empty() ? morphsOf(rig.model, part, gltf::none, 0)
+      layers.empty() ? morphsOf(rig.model, part, noIndex, 0)
                      : morphsOf(rig.model, part, layers[0].clip, layers[0].time);
   const std::vector<dvec3> positions = skinned(mesh.view(), rig.sample(layers, part.skin), morphs);
   result.positions.insert(result.positions.end(), positions.begin(), positions.end());
@@ -72,11 +84,15 @@ void addPrimitive(const PackedRig& rig, const gltf::SkinnedPrimitive& part,
   const reference::SampledPose expected =
       must(reference::samplePose(rig.skeleton, rig.clips, {}, layers, part.skin, &*rig.bank));
   const std::vector<JointMatrix> atRest(skin.joints.size());
-  for (const dvec3& point : skinned(mesh.view(), atRest, morphs)) {
+  const InfluenceSet& influences = mesh.view().influenceSets[0];  // uint32 and float32
+  const std::vector<dvec3> points = skinned(mesh.view(), atRest, morphs);
+  for (std::uint32_t vertex = 0; vertex < points.size(); ++vertex) {
     double bound = 0;
-    for (std::size_t joint = 0; joint < skin.joints.size(); ++joint) {
+    for (std::uint32_t i = 0; i < influences.joints.components; ++i) {
+      if (component<float>(influences.weights, vertex, i) == 0) continue;
+      const auto joint = component<std::uint32_t>(influences.joints, vertex, i);
       const auto [atJoint, perDistance] = expected.bounds[joint];
-      const dvec3 inJoint(matrixOf(skin.inverseBind[joint].m) * dvec4(point, 1));
+      const dvec3 inJoint(matrixOf(skin.inverseBind[joint].m) * dvec4(points[vertex], 1));
       bound = std::max(bound, atJoint + perDistance * glm::length(inJoint));
     }
     result.bounds.push_back(bound);

@@ -2,8 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "clip_rig.h"
 #include "random_number.h"
@@ -40,11 +44,76 @@ TEST(ClipsPack, KeepsTheError) {
   checkClips(rig);
 }
 
+/// Joints 1 apart, which all turn by 24 degrees a frame about one axis.
+gltf::Model turningChain(std::uint32_t joints, std::uint32_t frames) {
+  gltf::Model model;
+  model.nodes.resize(joints);
+  model.skins = {{"skin", {}, std::vector<JointMatrix>(joints)}};
+  model.clips.push_back({"turn", frames / 30.0, {}});
+  Floats times, rotations;
+  for (std::uint32_t frame = 0; frame <= frames; ++frame) {
+    const double half = 12 * std::numbers::pi / 180 * frame;
+    times.push_back(static_cast<float>(frame / 30.0));
+    for (const double x : {0.0, 0.0, std::sin(half), std::cos(half)})
+      rotations.push_back(static_cast<float>(x));
+  }
+  for (std::uint32_t joint = 0; joint < joints; ++joint) {
+    if (joint > 0) {
+      model.nodes[joint].parent = joint - 1;
+      model.nodes[joint].translation = {1, 0, 0};
+    }
+    model.nodeOrder.push_back(joint);
+    model.skins[0].joints.push_back(joint);
+    model.clips[0].channels.push_back(channel(joint, ChannelPath::rotation, times, rotations));
+  }
+  return model;
+}
+
+/// The largest distance, over all joints, of a point 1 away along an axis from where the clip has
+/// it.
+double errorAt(const PackedRig& rig, double seconds) {
+  const double time = double{clipTime(rig.bank->clip(0), seconds, true)};
+  const std::vector<JointMatrix> pose = rig.sample(ClipLayer{.time = time, .hold = true});
+  const std::vector<Transform> exact = gltf::nodeGlobals(rig.model, 0, time);
+  double worst = 0;
+  for (std::size_t joint = 0; joint < pose.size(); ++joint) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const double side : {-1.0, 1.0}) {
+        std::array<double, 3> off{};
+        for (std::size_t row = 0; row < 3; ++row) {
+          const auto& stored = pose[joint].m[row];
+          off[row] = double{stored[3]} - exact[joint][row][3] +
+                     side * (double{stored[axis]} - exact[joint][row][axis]);
+        }
+        worst = std::max(worst, std::hypot(off[0], off[1], off[2]));
+      }
+    }
+  }
+  return worst;
+}
+
+// Small errors of fast rotations add up along a chain, and are 0 halfway between two keys.
+TEST(ClipsPack, KeepsTheErrorOfChainsBetweenKeys) {
+  for (const auto& [joints, frames] : {std::pair(4u, 30u), std::pair(30u, 10u)}) {
+    SCOPED_TRACE(joints);
+    PackedRig rig(turningChain(joints, frames));
+    ASSERT_TRUE(rig.pack());
+    std::mt19937 random(1);
+    double worst = 0;
+    for (int i = 0; i < 2000; ++i)
+      worst = std::max(worst, errorAt(rig, between(random, 0, rig.clips[0].duration)));
+    EXPECT_LE(worst, rig.report.maxError);
+    EXPECT_LE(worst, 1.03 * rig.report.worstError);
+  }
+}
+
 TEST(ClipsPack, ReportsWhatItMade) {
   PackedRig rig(armRig());
   ASSERT_TRUE(rig.pack());
   EXPECT_GE(rig.report.animatedTracks, 7u) << "channels of both clips";
   EXPECT_GE(rig.report.keyCount, 2 * rig.report.animatedTracks);
+  EXPECT_GT(rig.report.slowestRate, 0);
+  EXPECT_LT(rig.report.slowestRate, rig.report.fastestRate) << "some tracks need fewer keys";
   const auto has = [&](const char* text) {
     return rig.report.worst.find(text) != std::string::npos;
   };
@@ -193,7 +262,7 @@ TEST(ClipsPack, NodesAreInAnyOrder) {
       std::swap(places[i - 1], places[below(random, i)]);
     gltf::Model other = model;
     const auto move = [&](std::uint32_t& node) {
-      if (node != gltf::none) node = places[node];
+      if (node != noIndex) node = places[node];
     };
     for (std::size_t i = 0; i < places.size(); ++i) other.nodes[places[i]] = model.nodes[i];
     for (gltf::Node& node : other.nodes) move(node.parent);

@@ -55,15 +55,15 @@ PackedMesh mesh(Numbers& numbers) {
   }
   InfluenceSet set;
   set.joints = {joints.data(), vertexCount, 16, ComponentType::uint32, 4};
-  set.weights = floatAttribute(weights.data(), vertexCount, 4);
+  set.weights = attributeView(weights.data(), vertexCount, 4);
   MeshView view;
   view.vertexCount = vertexCount;
-  view.positions = floatAttribute(positions.data(), vertexCount, 3);
-  view.normals = floatAttribute(normals.data(), vertexCount, 3);
-  view.tangents = floatAttribute(tangents.data(), vertexCount, 4);
-  view.centersOfRotation = floatAttribute(centers.data(), vertexCount, 3);
-  view.dualQuaternionWeights = floatAttribute(shares.data(), vertexCount, 1);
-  view.bulgeStrengths = floatAttribute(strengths.data(), vertexCount, 1);
+  view.positions = attributeView(positions.data(), vertexCount, 3);
+  view.normals = attributeView(normals.data(), vertexCount, 3);
+  view.tangents = attributeView(tangents.data(), vertexCount, 4);
+  view.centersOfRotation = attributeView(centers.data(), vertexCount, 3);
+  view.dualQuaternionWeights = attributeView(shares.data(), vertexCount, 1);
+  view.bulgeStrengths = attributeView(strengths.data(), vertexCount, 1);
   view.influenceSets = {&set, 1};
   return pack(view, jointCount).value();
 }

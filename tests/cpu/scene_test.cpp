@@ -118,7 +118,7 @@ TEST_F(CpuSceneTest, NoBitDependsOnHowLongJobsAre) {
       planned += job.vertexCount();
       // A job of several instances has at least a block of each.
       EXPECT_LE(job.vertexCount(), std::max(vertices, 32u));
-      cpu::skin(job);
+      cpu::run(job);
     }
     EXPECT_EQ(planned, 9u * sceneVertices);
     EXPECT_EQ(engine_->statistics().lastFrame.skinnedVertices, planned);

@@ -770,10 +770,10 @@ TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
     const float position[3] = {1, 2, 3};
     InfluenceSet set;
     set.joints = {numbers.data(), 1, influences * 4, ComponentType::uint32, influences};
-    set.weights = floatAttribute(weights.data(), 1, influences);
+    set.weights = attributeView(weights.data(), 1, influences);
     MeshView view;
     view.vertexCount = 1;
-    view.positions = floatAttribute(position, 1, 3);
+    view.positions = attributeView(position, 1, 3);
     view.influenceSets = {&set, 1};
     const Result<cpu::Mesh> mesh = cpu::Mesh::create(pack(view, joints).value());
     EXPECT_EQ(mesh.ok(), influences == 1000);

@@ -179,7 +179,7 @@ TEST(DocumentedExampleTest, ARigIsImported) {
   const PackedRig rig = must(importRig(model, meshes));
   ASSERT_EQ(meshes.size(), 1u);
   EXPECT_EQ(rig.drivenJoints(), 5u);
-  std::vector<JointMatrix> pose = gltf::pose(model, 0, gltf::none, 0);
+  std::vector<JointMatrix> pose = gltf::pose(model, 0, noIndex, 0);
   pose.resize(pose.size() + rig.drivenJoints());
   std::vector<float> weights(rig.drivenWeights(), 7.0f);
   must(driveJoints(rig, pose, weights));
@@ -260,7 +260,7 @@ TEST(DocumentedExampleTest, FiguresOfASceneAreAnimatedFromABank) {
   for (std::uint64_t frame = 1; frame <= 2; ++frame) {
     must(scene.beginFrame(frame, frame - 1));
     must(playAll(scene, figures, static_cast<double>(frame), 0.5f));
-    for (const cpu::PlannedJob& job : must(runner.jobs())) cpu::skin(job);
+    for (const cpu::PlannedJob& job : must(runner.jobs())) cpu::run(job);
     EXPECT_EQ(scene.statistics().lastFrame.sampledFigures, 3u);
     EXPECT_EQ(scene.statistics().lastFrame.skinnedInstances, 3u);
   }
@@ -379,7 +379,7 @@ TEST(DocumentedExampleTest, ASceneIsSkinnedOnTheCpu) {
   must(scene.beginFrame(1, 0));
   std::ranges::copy(jointMatrices, must(scene.writePose(figure.pose)).begin());
   const std::span<const cpu::PlannedJob> jobs = must(runner.jobs());
-  for (const cpu::PlannedJob& job : jobs) threadPool.run([&] { cpu::skin(job); });
+  for (const cpu::PlannedJob& job : jobs) threadPool.run([&] { cpu::run(job); });
   threadPool.wait();
   const InstanceOutput output = must(scene.output(instance));
   const std::byte* skinned = runner.output().data() + output.offset;

@@ -180,14 +180,16 @@ class Imports : protected Arguments {
     const Filled<dermis_pipeline_info> info;
     expect(call({&info}, dermis_describe_pipeline, dispatch.pipeline, info.get()) == DERMIS_OK);
     expect(dispatch.constant_count <= std::size(dispatch.constants));
-    expect((dispatch.group_count_x * dispatch.group_count_y > 0) != (dispatch.is_indirect != 0));
+    expect((dispatch.group_count_x * dispatch.group_count_y > 0) !=
+           (dispatch.indirect.byte_count != 0));
     for (std::uint32_t i = 0; i < dispatch.binding_count; ++i) {
       const dermis_binding& binding = dispatch.bindings[i];
       expect(binding.slot < info->storage_buffers + info->texel_buffers);
       const std::uint64_t size = sizeOfBuffer(binding.part.buffer);
       expect(binding.part.offset <= size && binding.part.byte_count <= size - binding.part.offset);
-      if (i == 0 && dispatch.is_indirect != 0) expect(dispatch.indirect_offset + 12 <= size);
     }
+    if (dispatch.indirect.byte_count != 0)
+      expect(dispatch.indirect.offset + 12 <= sizeOfBuffer(dispatch.indirect.buffer));
   }
 
   void makePlan() {

@@ -1,5 +1,6 @@
 // libFuzzer: any bytes as a stored bank of clips, and any numbers as a skeleton with clips to pack.
-// What is accepted must be safe to sample, with any layers.
+// What is accepted must be safe to sample with any layers, by a function and in a scene, and to
+// bound.
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 
 #include "changed_blob.h"
 #include "dermis/clips.h"
+#include "dermis/cpu.h"
 #include "kernel_reads.h"
 
 using namespace dermis;
@@ -207,7 +209,7 @@ std::vector<std::uint32_t> bankOf(std::span<const std::uint32_t> good,
   return words;
 }
 
-void sample(const PackedClips& bank, Input& input) {
+std::vector<ClipLayer> sample(const PackedClips& bank, Input& input) {
   std::vector<ClipLayer> layers(input.below(maxClipLayers + 2));
   for (ClipLayer& layer : layers) {
     layer.clip = input.below(bank.clipCount() + 1);
@@ -236,6 +238,43 @@ void sample(const PackedClips& bank, Input& input) {
     require(sampled.ok() || !sampled.error().message.empty());
     require(sampleWeights(bank, {}, node, weights).ok());
   }
+  return layers;
+}
+
+/// Boxes of a triangle that follows joint 0 of each skin, and a frame in which it plays.
+void boundAndPlay(const PackedClips& bank, std::span<const ClipLayer> layers) {
+  const std::array<float, 9> positions{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::array<std::uint8_t, 3> joints{0, 0, 0};
+  const std::array<float, 3> weights{1, 1, 1};
+  const InfluenceSet influences{attributeView(joints.data(), 3, 1),
+                                attributeView(weights.data(), 3, 1)};
+  MeshView mesh;
+  mesh.vertexCount = 3;
+  mesh.positions = attributeView(positions.data(), 3, 3);
+  mesh.influenceSets = {&influences, 1};
+  const JointBounds bounds = *jointBounds(mesh, 1);
+  std::vector<std::uint32_t> clips;
+  for (std::uint32_t clip = 0; clip < std::min(bank.clipCount(), 4u); ++clip) clips.push_back(clip);
+
+  Result<cpu::SceneRunner> runner = cpu::SceneRunner::create();
+  require(runner.ok());
+  Scene& scene = runner->scene();
+  const ClipsHandle handle = *scene.addClips(PackedClips(bank));
+  const Result<FigureHandle> figure = scene.addFigure(handle);
+  InstanceDescription instance;
+  instance.mesh = *scene.addMesh(*pack(mesh, 1));
+  for (std::uint32_t skin = 0; skin < std::min(bank.skinCount(), 4u); ++skin) {
+    for (const std::uint32_t clip : clips)
+      (void)clipBounds(bank, clip, skin, bounds, Method::dualQuaternion);
+    (void)blendBounds(bank, clips, skin, bounds, Method::linear);
+    if (!figure) continue;
+    instance.pose = *scene.pose(*figure, skin);
+    (void)scene.addInstance(instance);
+  }
+  if (!figure) return;
+  require(scene.beginFrame(1, 0).ok());
+  (void)scene.play(std::array{FigurePlay{*figure, layers}});
+  for (const cpu::PlannedJob& job : *runner->jobs()) cpu::run(job);
 }
 
 }  // namespace
@@ -260,6 +299,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(!bank.error().message.empty());
     return 0;
   }
-  sample(*bank, input);
+  boundAndPlay(*bank, sample(*bank, input));
   return 0;
 }

@@ -57,7 +57,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (std::size_t i = 0; i < std::min<std::size_t>(model.skinnedPrimitives.size(), 4); ++i) {
     const gltf::SkinnedPrimitive& skinned = model.skinnedPrimitives[i];
     checkPrimitive(model, skinned);
-    const std::uint32_t clip = model.clips.empty() ? gltf::none : 0;
+    const std::uint32_t clip = model.clips.empty() ? noIndex : 0;
     require(gltf::morphWeights(model, skinned.node, clip, 0.5).size() ==
             model.meshes[skinned.mesh].morphTargetCount);
   }

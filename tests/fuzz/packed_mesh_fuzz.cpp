@@ -37,18 +37,18 @@ std::vector<std::uint32_t> makeGoodBlob() {
   }
   const std::vector<std::uint32_t> some{3, 4, 63, 64, 100, 149};
   const InfluenceSet set{{joints.data(), vertexCount, 3, ComponentType::uint8, 3},
-                         floatAttribute(weights.data(), vertexCount, 3)};
+                         attributeView(weights.data(), vertexCount, 3)};
   std::array<MorphTargetView, 3> targets;
-  targets[0].positions = floatAttribute(positions.data(), vertexCount, 3);
+  targets[0].positions = attributeView(positions.data(), vertexCount, 3);
   targets[1].vertices = some;
-  targets[1].positions = floatAttribute(normals.data(), 6, 3);
-  targets[1].normals = floatAttribute(tangents.data(), 6, 3);
-  targets[1].tangents = floatAttribute(normals.data(), 6, 3);
+  targets[1].positions = attributeView(normals.data(), 6, 3);
+  targets[1].normals = attributeView(tangents.data(), 6, 3);
+  targets[1].tangents = attributeView(normals.data(), 6, 3);
   MeshView mesh;
   mesh.vertexCount = vertexCount;
-  mesh.positions = floatAttribute(positions.data(), vertexCount, 3);
-  mesh.normals = floatAttribute(normals.data(), vertexCount, 3);
-  mesh.tangents = floatAttribute(tangents.data(), vertexCount, 4);
+  mesh.positions = attributeView(positions.data(), vertexCount, 3);
+  mesh.normals = attributeView(normals.data(), vertexCount, 3);
+  mesh.tangents = attributeView(tangents.data(), vertexCount, 4);
   mesh.influenceSets = {&set, 1};
   mesh.morphTargets = targets;
   const Result<PackedMesh> packed = pack(mesh, jointCount);

@@ -93,9 +93,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(packed->writtenJoints() == model.skins[0].joints.size());
   std::vector<JointMatrix> driven(packed->drivenJoints());
   std::vector<float> given, weights(packed->givenWeights() + packed->drivenWeights());
-  if (packed->givenWeights() != 0)
-    given = gltf::morphWeights(model, (*rig)->weightsOf, gltf::none, 0);
-  require(evaluateRig(*packed, gltf::pose(model, 0, gltf::none, 0), given, driven, weights).ok());
+  if (packed->givenWeights() != 0) given = gltf::morphWeights(model, (*rig)->weightsOf, noIndex, 0);
+  require(evaluateRig(*packed, gltf::pose(model, 0, noIndex, 0), given, driven, weights).ok());
   const auto joints = static_cast<std::uint32_t>((*rig)->joints.size());
   for (const gltf::SkinnedPrimitive& skinned : model.skinnedPrimitives) {
     const gltf::Mesh& mesh = model.meshes[skinned.mesh];

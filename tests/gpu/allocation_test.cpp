@@ -104,7 +104,6 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
   samples::Device& device = *open_->device;
   vulkan::SceneRecorderDescription description;
   description.measuresGpuTime = true;
-  description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   std::optional<vulkan::SceneRecorder> system =
       must(vulkan::SceneRecorder::create(open_->context, description));
   const PackedMesh mesh = systemMesh(1, 50);
@@ -220,7 +219,7 @@ TEST(CpuAllocationTest, WarmFramesAllocateNothing) {
       if (frame % 9 == 8) {
         expect(system.scene().abandonFrame(frame).ok());
       } else {
-        for (const cpu::PlannedJob& job : *jobs) cpu::skin(job);
+        for (const cpu::PlannedJob& job : *jobs) cpu::run(job);
       }
     }
     if (frame == 40) {
@@ -269,7 +268,7 @@ bool runInNewThread(const cpu::PlannedJob& job, std::uint32_t allocationsAllowed
   std::packaged_task<bool()> run([&] {
     allowed = allocationsAllowed;
     try {
-      cpu::skin(job);
+      cpu::run(job);
       allowed = ~0u;
       return true;
     } catch (const std::bad_alloc&) {

@@ -81,7 +81,6 @@ TEST(SmoothWalkOnDevice, SeldomUpdatesAreAsSmoothAsTheBarsSay) {
   SmoothWalk(*data).check<SystemEngine>(
       [&](std::optional<SystemEngine>& engine) {
         vulkan::SceneRecorderDescription description;
-        description.outputUsage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
         engine.emplace(*open->device, open->context, description);
       },
       [](SystemEngine& engine, const InstanceDescription& instance) {

@@ -106,7 +106,7 @@ class ValueDrawer {
                                      VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, read.handle(), 1,
                                      &region);
     }
-    recordBarrier(device_, commands, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    recordBarrier(device_, commands, Use::copyWrite, Use::hostRead);
     must(functions.EndCommandBuffer(commands));
     must(device_.submitAndWait(commands));
     device_.freeCommandBuffer(commands);

@@ -49,8 +49,7 @@ class Encoder {
         return bound;
       kernels_.push(commands, {&first, 1});
       device_.functions().CmdDispatch(commands, valuesTogether / workgroupSize, 1, 1);
-      samples::recordBarrier(device_, commands,
-                             vulkan::barrierBetween(Use::computeWrite, Use::hostRead));
+      samples::recordBarrier(device_, commands, Use::computeWrite, Use::hostRead);
       return {};
     });
     if (!done) throw std::runtime_error(done.error().message);

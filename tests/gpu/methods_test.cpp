@@ -151,7 +151,8 @@ TEST_P(MethodTest, Truth20_TheVariantForFewerInfluencesChangesNoBit) {
   for (const std::uint32_t influences : {1u, 2u, 3u, 4u}) {
     OwnedMesh few = randomMesh(influences, 500, 10, influences);
     const PackedMesh packedFew = *pack(few.view(), 10);
-    for (const Rigidity rigidity : {Rigidity::rigid, Rigidity::shear}) {
+    for (const Rigidity rigidity :
+         {Rigidity::rigid, Rigidity::shear, Rigidity::mirrored, Rigidity::mirroredAlongOneAxis}) {
       const std::vector<JointMatrix> pose = randomPose(3, 10, rigidity);
       const std::vector<samples::SkinRequest> requests{
           {&packedFew, pose, JointPromise::scaling, GetParam()},

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <random>
 #include <span>
 #include <string>
 #include <utility>
@@ -137,25 +138,69 @@ double shareOfBounds(const reference::EvaluatedRig& right, const Driven& found) 
   return share;
 }
 
-TEST_F(RigOnDevice, DrivesWhatTheReferenceDoesWithinItsBounds) {
-  const auto source = riggedSource();
+/// Of all numbers that it drives for many poses. As `dermis verify` does.
+double worstShare(samples::OpenDevice& open, const RigView& rig) {
   std::vector<samples::RigInput> inputs;
+  const std::array<float, 2> given{0.5f, -0.25f};
   for (std::uint32_t seed = 0; seed < 70; ++seed)  // more than a workgroup
-    inputs.push_back({systemPose(seed, riggedJoints), {0.5f, -0.25f}});
-  // As `dermis verify` does.
-  samples::VulkanTarget target(*open_->device, open_->context);
-  const std::vector<Driven> driven = must(target.drivePoses(must(packRig(source->view)), inputs));
-  ASSERT_EQ(driven.size(), inputs.size());
+    inputs.push_back({systemPose(seed, riggedJoints),
+                      std::vector<float>(given.begin(), given.begin() + rig.givenWeights)});
+  samples::VulkanTarget target(*open.device, open.context);
+  const std::vector<Driven> driven = must(target.drivePoses(must(packRig(rig)), inputs));
+  EXPECT_EQ(driven.size(), inputs.size());
   double worst = 0;
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    const auto& [written, given] = inputs[i];
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    const auto& [written, weights] = inputs[i];
     const double share =
-        shareOfBounds(must(reference::evaluateRig(source->view, written, given)), driven[i]);
+        shareOfBounds(must(reference::evaluateRig(rig, written, weights)), driven[i]);
     EXPECT_LE(share, 1) << "pose " << i;
     worst = std::max(worst, share);
   }
+  return worst;
+}
+
+TEST_F(RigOnDevice, DrivesWhatTheReferenceDoesWithinItsBounds) {
+  const double worst = worstShare(*open_, riggedSource()->view);
   EXPECT_GT(worst, 0.01);
   RecordProperty("worst share of a bound", std::to_string(worst));
+}
+
+// What the kernel keeps of a corrective does not reach the next pose.
+TEST_F(RigOnDevice, DrivesByAsManyExamplesAsAreAllowed) {
+  for (const std::uint32_t inputCount : {1u, 3u}) {
+    SCOPED_TRACE(inputCount);
+    const auto source = riggedSource();
+    std::mt19937 random(inputCount);
+    std::uniform_real_distribution<float> between(-1, 1);
+    const auto quaternion = [&] {
+      return std::array<float, 4>{between(random), between(random), between(random),
+                                  between(random)};
+    };
+    const std::array<std::uint32_t, 3> inputs{2, 5, 7};
+    const std::array<std::uint32_t, 2> driven{riggedJoints, riggedJoints + 1};
+    constexpr std::uint32_t weightCount = 9;
+    std::vector<std::array<float, 4>> examples(maxRigExamples * inputCount);
+    std::vector<float> weights(maxRigExamples * weightCount);
+    std::vector<JointOffset> offsets(maxRigExamples * driven.size());
+    for (auto& example : examples) example = quaternion();
+    for (float& weight : weights) weight = between(random);
+    for (JointOffset& offset : offsets)
+      offset = {{between(random), between(random), 0.1f}, quaternion(), {1, 1.5f, 0.75f}};
+    const std::array correctives{CorrectiveDriver{.inputs = std::span(inputs).first(inputCount),
+                                                  .examples = examples,
+                                                  .radius = 0.5f,
+                                                  .firstWeight = 0,
+                                                  .weightCount = weightCount,
+                                                  .weights = weights,
+                                                  .joints = driven,
+                                                  .offsets = offsets}};
+    RigView view;
+    view.joints = std::span(source->joints).first(riggedJoints + driven.size());
+    view.writtenJoints = riggedJoints;
+    view.drivenWeights = weightCount;
+    view.correctives = correctives;
+    EXPECT_GT(worstShare(*open_, view), 0);
+  }
 }
 
 TEST_F(RigOnDevice, ARigMayDriveNothing) {

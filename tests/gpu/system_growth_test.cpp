@@ -33,7 +33,6 @@ class SystemGrowthTest : public SystemTest {
 
 TEST_F(SystemGrowthTest, ASceneOfOneCharacterTakesLessThanAMebibyte) {
   SceneRecorderDescription defaults;
-  defaults.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   const PackedMesh character = systemMesh(1, 3273, 19);
   SystemEngine engine(device(), context(), defaults);
   engine.begin();

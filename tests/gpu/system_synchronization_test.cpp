@@ -99,10 +99,10 @@ class BusyScene {
  private:
   void cull(VkCommandBuffer commandBuffer) {
     // The last frame's words have been read by a kernel.
-    engine_.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyWrite));
+    engine_.recordBarrier(commandBuffer, Use::dermis, Use::copyWrite);
     device_.functions().CmdFillBuffer(commandBuffer, visibility_.handle(), 0, VK_WHOLE_SIZE,
                                       engine_.frame() % 5 != 0 ? 1 : 0);
-    engine_.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::dermis));
+    engine_.recordBarrier(commandBuffer, Use::copyWrite, Use::dermis);
   }
   void draw(VkCommandBuffer commandBuffer) {
     const VkBufferCopy all{0, 0, size_};
@@ -211,15 +211,16 @@ class EventfulFrames {
       return forgets(stageNames(source) + " to " + stageNames(destination));
     };
     engine.recordsBarriers = events.draws;
-    engine.forgetsBarrier = [&](const vulkan::Barrier& barrier) {
+    engine.forgetsBarrier = [&](Use before, Use after) {
+      const vulkan::Barrier barrier = vulkan::barrierBetween(before, after);
       return forgets("the engine's " + stageNames(barrier.sourceStages) + " to " +
                      stageNames(barrier.destinationStages));
     };
     engine.beforeRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.culls) return;
-      engine.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyWrite));
+      engine.recordBarrier(commandBuffer, Use::dermis, Use::copyWrite);
       device.functions().CmdFillBuffer(commandBuffer, words.handle(), 0, VK_WHOLE_SIZE, 1);
-      engine.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::dermis));
+      engine.recordBarrier(commandBuffer, Use::copyWrite, Use::dermis);
     };
     engine.afterRecord = [&](VkCommandBuffer commandBuffer) {
       if (!events.draws) return;

@@ -103,7 +103,7 @@ class ThreadsTest : public DeviceTest {
 
   /// Each repeat uses the palettes and the output of the one before.
   void recordEdge(VkCommandBuffer commandBuffer) {
-    context().recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::dermis));
+    context().recordBarrier(commandBuffer, Use::dermis, Use::dermis);
   }
 
   samples::MappedBuffer upload(const PackedMesh& mesh) {
@@ -334,7 +334,6 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   description.scene.meshCapacity = description.scene.outputCapacity = Capacity::fixed(1 << 20);
   description.scene.jointCapacity = description.scene.instanceCapacity =
       description.scene.boundsCapacity = Capacity::fixed(256);
-  description.outputUsage |= VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
   description.tuning = Tuning{16, 2};
   SystemEngine engine(device(), context(), description);
   OwnedMesh mesh = randomMesh(1, 500, 10, 4);

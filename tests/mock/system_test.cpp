@@ -98,6 +98,22 @@ TEST_F(MockSystemTest, WhereABlockFindsNoMemoryABufferAloneDoes) {
   EXPECT_LT(mock.memoryBytes(), 128u << 10);
 }
 
+TEST_F(MockSystemTest, AMisalignedVisibilityBufferIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(create());
+  make(small());
+  InstanceDescription culled;
+  culled.culledOnGpu = true;
+  add(culled);
+  begin();
+  const std::uint32_t alignment = context->limits().minStorageBufferOffsetAlignment;
+  ASSERT_GT(alignment, 4u);
+  const Result<void> refused = system->record(commandBuffer, {visibility, 4});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("visibilityOffset is 4"), std::string::npos);
+  EXPECT_TRUE(mock.commands.empty());
+  must(system->record(commandBuffer, {visibility, alignment}));
+}
+
 /// A GPU in a PC: device memory, host memory, a little that is both, and a type that needs a
 /// feature.
 struct PretendedHeaps {

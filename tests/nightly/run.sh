@@ -234,7 +234,7 @@ part_compilers() {
   table=build/ci/tests/bench/dermis_compiler_table
   build ci dermis_compiler_table
   tests/bench/compilers.py "$table"
-  for module in palette clear visibility sample compose skin skin_one_output skin_staged skin_extras skin_bulge skin_bulge_one_output skin_bulge_extras; do
+  for module in palette clear visibility sample compose morph_lists rig skin skin_one_output skin_staged skin_extras skin_bulge skin_bulge_one_output skin_bulge_extras; do
     for language in "hlsl --shader-model 60" "msl --msl-version 20300"; do
       # shellcheck disable=SC2086 # an option and its argument
       spirv-cross --$language "build/ci/shaders/dermis_kernels/$module.spv" >/dev/null

@@ -58,7 +58,7 @@ TEST(ReferenceDualQuaternion, WeightsOfOneJointThatAddUpToATieAreATie) {
                              {weights, 1, 4, ComponentType::unorm8, 4}};
       MeshView mesh;
       mesh.vertexCount = 1;
-      mesh.positions = floatAttribute(position, 1, 3);
+      mesh.positions = attributeView(position, 1, 3);
       mesh.influenceSets = {&set, 1};
       const Result<reference::AnalyzedMesh> result =
           reference::analyze(mesh, pose, Method::dualQuaternion);

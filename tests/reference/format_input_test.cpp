@@ -62,9 +62,9 @@ struct FormatInputTest : public ::testing::Test {
     zeroPositions.assign(3 * vertices, 0.0f);
     joints.assign(vertices, 0);
     weights.assign(vertices, 0.0f);
-    mesh.positions = floatAttribute(zeroPositions.data(), mesh.vertexCount, 3);
+    mesh.positions = attributeView(zeroPositions.data(), mesh.vertexCount, 3);
     set.joints = {joints.data(), mesh.vertexCount, 4, ComponentType::uint32, 1};
-    set.weights = floatAttribute(weights.data(), mesh.vertexCount, 1);
+    set.weights = attributeView(weights.data(), mesh.vertexCount, 1);
     mesh.influenceSets = {&set, 1};
     return mesh;
   }
@@ -155,7 +155,7 @@ TEST_F(FormatInputTest, DirectionsInSnorm16) {
 TEST_F(FormatInputTest, AFourthComponentOfFloatsIsNotRead) {
   const std::array values{1.0f, 2.0f, 3.0f, 77.0f, 4.0f, 5.0f, 6.0f, 88.0f};
   MeshView view = freeMesh(2);
-  view.positions = view.normals = floatAttribute(values.data(), 2, 4);
+  view.positions = view.normals = attributeView(values.data(), 2, 4);
   const reference::AnalyzedMesh result = skinnedFree(view);
   EXPECT_EQ(result.positions[1], (reference::Double3{4, 5, 6}));
   expectNear(toVector(result.normals[1]), glm::normalize(glm::dvec3(4, 5, 6)), 1e-15);
@@ -197,7 +197,7 @@ TEST_F(FormatInputTest, OnlyWhatIsNoFloat32IsRounded) {
     return skinnedFree(view).conditioning[vertex];
   };
   const std::array floats{0.1f, -0.7f, 1e30f, 3.0f, 0.3f, 0.1f};
-  view.positions = view.normals = floatAttribute(floats.data(), 2, 3);
+  view.positions = view.normals = attributeView(floats.data(), 2, 3);
   EXPECT_EQ(conditioning(0).positionRounding, 0);
   EXPECT_EQ(conditioning(0).normalRounding, 0);
   const Elements halves = elementsOf(std::vector<int>{0x3c01, 0x0001, 0x7bff, 0x1234, 0, 0}, 3,

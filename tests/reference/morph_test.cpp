@@ -25,7 +25,7 @@ struct OwnedTarget {
     const auto attribute = [](const std::vector<float>& values) {
       return values.empty()
                  ? AttributeView{}
-                 : floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / 3), 3);
+                 : attributeView(values.data(), static_cast<std::uint32_t>(values.size() / 3), 3);
     };
     target.positions = attribute(positions);
     target.normals = attribute(normals);
@@ -74,7 +74,7 @@ struct MorphTest : public ::testing::Test {
 
   MeshView view() {
     MeshView mesh = owned.view();
-    mesh.tangents = floatAttribute(tangents.data(), count, 4);
+    mesh.tangents = attributeView(tangents.data(), count, 4);
     targetViews.clear();
     for (const OwnedTarget& target : targets) targetViews.push_back(target.view());
     mesh.morphTargets = targetViews;
@@ -235,7 +235,7 @@ TEST_F(MorphTest, DisplacementsOfEveryFormat) {
   one.normals = {0, 0, 1};
   const float tangent[] = {1, 0, 0, 1};
   MeshView mesh = one.view();
-  mesh.tangents = floatAttribute(tangent, 1, 4);
+  mesh.tangents = attributeView(tangent, 1, 4);
   mesh.positionScale = {1, 1, 1};
   const std::uint16_t halves[] = {0x3800, 0xc000, 0x3c00};  // 0.5, -2, 1
   const std::int16_t shorts[] = {32767, -32767, 0};

@@ -25,7 +25,7 @@ struct TangentMesh {
   }
   MeshView view() {
     MeshView view = mesh.view();
-    view.tangents = floatAttribute(tangents.data(), mesh.vertexCount(), 4);
+    view.tangents = attributeView(tangents.data(), mesh.vertexCount(), 4);
     return view;
   }
   reference::AnalyzedMesh skinned(std::span<const JointMatrix> pose, Method method) {

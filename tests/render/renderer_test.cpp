@@ -64,7 +64,7 @@ class RendererTest : public DrawingTest {
   /// The pose, and the box around it.
   std::optional<Box> pose(cli::DrawnScene& drawn, const cli::Scene& scene, double time) {
     EXPECT_TRUE(drawn.beginFrame());
-    const std::uint32_t clip = scene.model->clips.empty() ? gltf::none : 0;
+    const std::uint32_t clip = scene.model->clips.empty() ? noIndex : 0;
     EXPECT_TRUE(drawn.setPose(0, cli::scenePose(scene, clip, time)));
     (void)draw(&drawn, {});
     EXPECT_TRUE(drawn.beginFrame());

@@ -30,10 +30,10 @@ class BendChain : public ::testing::Test {
                                                    const std::vector<float>& weights) {
     const auto count = static_cast<std::uint32_t>(positions.size() / 3);
     const InfluenceSet set{{joints.data(), count, 8, ComponentType::uint32, 2},
-                           floatAttribute(weights.data(), count, 2)};
+                           attributeView(weights.data(), count, 2)};
     MeshView mesh;
     mesh.vertexCount = count;
-    mesh.positions = floatAttribute(positions.data(), count, 3);
+    mesh.positions = attributeView(positions.data(), count, 3);
     mesh.influenceSets = {&set, 1};
     const Result<RepairedMesh> bent = bendChain(mesh, joints_, chain_);
     EXPECT_TRUE(bent.ok()) << bent.error().message;
@@ -111,10 +111,10 @@ TEST_F(BendChain, WhatIsNoChainIsRefused) {
   const float position[3]{};
   const std::uint32_t joint = 0;
   const float weight = 1;
-  const InfluenceSet set{{&joint, 1, 4, ComponentType::uint32, 1}, floatAttribute(&weight, 1, 1)};
+  const InfluenceSet set{{&joint, 1, 4, ComponentType::uint32, 1}, attributeView(&weight, 1, 1)};
   MeshView mesh;
   mesh.vertexCount = 1;
-  mesh.positions = floatAttribute(position, 1, 3);
+  mesh.positions = attributeView(position, 1, 3);
   mesh.influenceSets = {&set, 1};
   const auto messageOf = [&](auto change) {
     const ChainDriver sound = chain_;

@@ -1,6 +1,8 @@
 // What `packRig` refuses, and that no damaged bytes lead a reader astray.
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cstddef>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -364,6 +366,47 @@ TEST(RigBytes, ADamagedWordIsFoundOrHarmless) {
   }
   EXPECT_GT(refused, 1000u);
   EXPECT_GT(accepted, 1000u);
+}
+
+/// The words with one of the header, or of the first corrective, changed.
+std::vector<std::uint32_t> withWord(const PackedRig& rig, std::size_t word, std::uint32_t value) {
+  std::vector<std::uint32_t> words = wordsOf(rig);
+  words[word] = value;
+  finishStored(words);
+  return words;
+}
+
+// `evaluateRig` allocates memory for them, and each thread of `evaluateRigs`, too.
+TEST(RigBytes, TheMostInputsAreThoseOfACorrective) {
+  MadeRig made = allDrivers();
+  const PackedRig rig = made.pack();
+  constexpr std::size_t word = offsetof(RigHeader, mostInputs) / 4;
+  EXPECT_EQ(RigBlob(rig).header.mostInputs, 2u);
+  EXPECT_TRUE(read(withWord(rig, word, 2)).ok());
+  for (const std::uint32_t wrong : {0u, 1u, 3u, RigBlob(rig).header.wordCount})
+    EXPECT_FALSE(read(withWord(rig, word, wrong)).ok()) << wrong;
+  made = MadeRig();
+  made.addJoint(noRigJoint, glm::dmat4(1));
+  made.writtenJoints = 1;
+  EXPECT_EQ(RigBlob(made.pack()).header.mostInputs, 0u);
+  EXPECT_FALSE(read(withWord(made.pack(), word, 1)).ok());
+}
+
+// A GPU may take a denormal number for 0, for which distances are not in an exponential.
+TEST(RigBytes, TheFactorOfACorrectiveIsNormal) {
+  const PackedRig rig = allDrivers().pack();
+  const RigBlob blob(rig);
+  std::size_t word = offsetof(RigCorrective, factor) / 4;
+  for (std::size_t i = 0; i < blob.header.driverCount; ++i)
+    if (blob.driver(i).kind == abi::RIG_CORRECTIVE) word += blob.driver(i).data;
+  const auto isRead = [&](float factor) {
+    return read(withWord(rig, word, std::bit_cast<std::uint32_t>(factor))).ok();
+  };
+  constexpr float least = std::numeric_limits<float>::min();
+  for (const float good : {0.0f, -0.0f, -least, -0.5f, -1e30f}) EXPECT_TRUE(isRead(good)) << good;
+  for (const float bad : {-1e-40f, 1e-40f, -0.99f * least, least, 1.0f})
+    EXPECT_FALSE(isRead(bad)) << bad;
+  for (const float bad : notFinite) EXPECT_FALSE(isRead(bad)) << bad;
 }
 
 /// With drivers at its end that drive nothing: chains of one node, which is the same for all.

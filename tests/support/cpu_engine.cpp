@@ -42,7 +42,7 @@ void CpuEngine::submit() {
   jobCount_ = jobs.size();
   const auto half = jobs.begin() + static_cast<std::ptrdiff_t>(jobs.size() / 2);
   const auto run = [](auto begin, auto end) {
-    std::for_each(begin, end, [](const cpu::PlannedJob& job) { cpu::skin(job); });
+    std::for_each(begin, end, [](const cpu::PlannedJob& job) { cpu::run(job); });
   };
   std::thread other(run, jobs.begin(), half);
   run(half, jobs.end());

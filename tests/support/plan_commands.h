@@ -28,7 +28,7 @@ struct PlannedDispatch : DispatchCommand {
   /// The part of an output that the skin kernel writes. Devices with few storage buffers have one.
   BufferPart outputPart(std::size_t stream) const {
     const BufferPart own = partAt(abi::BINDING_POSITIONS + static_cast<std::uint32_t>(stream));
-    return own.buffer != noBuffer ? own : partAt(abi::BINDING_POSITIONS);
+    return own.buffer != noIndex ? own : partAt(abi::BINDING_POSITIONS);
   }
 };
 

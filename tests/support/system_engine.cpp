@@ -7,8 +7,6 @@
 
 namespace dermis::test {
 
-using vulkan::barrierBetween;
-
 SystemEngine::SystemEngine(samples::Device& device, const vulkan::Context& context,
                            const vulkan::SceneRecorderDescription& description)
     : device_(device),
@@ -61,10 +59,10 @@ std::vector<std::byte> SystemEngine::readRange(const vulkan::BufferRange& range)
   const samples::MappedBuffer copy = must(
       samples::MappedBuffer::create(device_, range.size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   submitNow([&](VkCommandBuffer commandBuffer) {
-    recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::copyRead));
+    recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
     const VkBufferCopy all{range.offset, 0, range.size};
     device_.functions().CmdCopyBuffer(commandBuffer, range.buffer, copy.handle(), 1, &all);
-    recordBarrier(commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+    recordBarrier(commandBuffer, Use::copyWrite, Use::hostRead);
   });
   const std::span<const std::byte> bytes = copy.bytes();
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(range.size)};
@@ -91,8 +89,7 @@ Driven SystemEngine::readDriven(PoseHandle handle, std::uint32_t joints) {
 void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
   std::erase_if(gpuWrites_, [&](const GpuWrite& write) { return !rangeOf(write).ok(); });
   if (gpuWrites_.empty()) return;
-  if (recordsPoseBarriers)
-    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
+  if (recordsPoseBarriers) recordBarrier(commandBuffer, Use::dermis, Use::copyWrite);
   for (const GpuWrite& write : gpuWrites_) {
     const vulkan::BufferRange range = must(rangeOf(write));
     const std::size_t size = write.bytes.size();
@@ -105,8 +102,7 @@ void SystemEngine::writeGpuPoses(VkCommandBuffer commandBuffer) {
       must(scene().markMorphsWritten({&write.instance, 1}));
     }
   }
-  if (recordsPoseBarriers)
-    recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::dermis));
+  if (recordsPoseBarriers) recordBarrier(commandBuffer, Use::copyWrite, Use::dermis);
 }
 
 void SystemEngine::begin(std::uint32_t underWay) {
@@ -119,10 +115,10 @@ Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
                                        const vulkan::FrameDescription& frame) {
   if (beforeRecord) beforeRecord(commandBuffer);
   writeGpuPoses(commandBuffer);
-  if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::copyRead, Use::dermis));
+  if (recordsBarriers) recordBarrier(commandBuffer, Use::copyRead, Use::dermis);
   const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
                                                  : recorder_.record(commandBuffer, frame);
-  if (recordsBarriers) recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
+  if (recordsBarriers) recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
   if (afterRecord) afterRecord(commandBuffer);
   return recorded;
 }
@@ -209,10 +205,9 @@ void SystemEngine::submitNow(const std::function<void(VkCommandBuffer)>& record)
   waitFor({0, submitCommands(commandBuffer), commandBuffer});
 }
 
-void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer,
-                                 const vulkan::Barrier& barrier) const {
-  if (!forgetsBarrier || !forgetsBarrier(barrier))
-    samples::recordBarrier(device_, commandBuffer, barrier);
+void SystemEngine::recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const {
+  if (!forgetsBarrier || !forgetsBarrier(before, after))
+    samples::recordBarrier(device_, commandBuffer, before, after);
 }
 
 std::vector<std::byte> SystemEngine::readOutput() {
@@ -221,11 +216,11 @@ std::vector<std::byte> SystemEngine::readOutput() {
                                                    VK_BUFFER_USAGE_TRANSFER_DST_BIT, true));
   }
   submitNow([this](VkCommandBuffer commandBuffer) {
-    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyRead));
+    recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
     const VkBufferCopy all{0, 0, outputSize_};
     device_.functions().CmdCopyBuffer(commandBuffer, recorder_.outputBuffer(), readBack_.handle(),
                                       1, &all);
-    recordBarrier(commandBuffer, barrierBetween(Use::copyWrite, Use::hostRead));
+    recordBarrier(commandBuffer, Use::copyWrite, Use::hostRead);
   });
   const std::span<const std::byte> bytes = readBack_.bytes().first(outputSize_);
   return {bytes.begin(), bytes.end()};
@@ -233,11 +228,10 @@ std::vector<std::byte> SystemEngine::readOutput() {
 
 void SystemEngine::fillOutput(std::byte value) {
   submitNow([&](VkCommandBuffer commandBuffer) {
-    recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::copyWrite));
+    recordBarrier(commandBuffer, Use::dermis, Use::copyWrite);
     device_.functions().CmdFillBuffer(commandBuffer, recorder_.outputBuffer(), 0, VK_WHOLE_SIZE,
                                       std::to_integer<std::uint32_t>(value) * 0x01010101u);
-    recordBarrier(commandBuffer,
-                  barrierBetween(Use::copyWrite, Use::dermis | Use::copyRead | Use::copyWrite));
+    recordBarrier(commandBuffer, Use::copyWrite, Use::dermis | Use::copyRead | Use::copyWrite);
   });
 }
 

@@ -88,7 +88,7 @@ class SystemEngine {
   Driven readDriven(PoseHandle pose, std::uint32_t joints = drivenJoints);
   /// Submits what `record` records, and waits for it and all before.
   void submitNow(const std::function<void(VkCommandBuffer)>& record);
-  void recordBarrier(VkCommandBuffer commandBuffer, const vulkan::Barrier& barrier) const;
+  void recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const;
 
   /// Called in each frame before and behind the system's commands.
   std::function<void(VkCommandBuffer)> beforeRecord, afterRecord;
@@ -97,7 +97,7 @@ class SystemEngine {
   /// For tests of what happens without: the engine's own barriers around `record`, those around
   /// writes to poses, and each of them.
   bool recordsBarriers = true, recordsPoseBarriers = true;
-  std::function<bool(const vulkan::Barrier&)> forgetsBarrier;
+  std::function<bool(Use before, Use after)> forgetsBarrier;
 
  private:
   struct SubmittedFrame {

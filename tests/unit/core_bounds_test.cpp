@@ -689,9 +689,9 @@ TEST(Bounds, GrowByWhatMorphTargetsDisplace) {
   const std::array<std::uint32_t, 2> vertices{3, 17};
   for (int i = 0; i < 6; ++i) some.push_back(static_cast<float>(random.between(-2, 2)));
   std::array<MorphTargetView, 3> targets;
-  targets[0].positions = floatAttribute(all.data(), mesh.vertexCount(), 3);
+  targets[0].positions = attributeView(all.data(), mesh.vertexCount(), 3);
   targets[1].vertices = vertices;
-  targets[1].positions = floatAttribute(some.data(), 2, 3);
+  targets[1].positions = attributeView(some.data(), 2, 3);
   targets[1].positionScale = {1, 2, 1};
   MeshView view = mesh.view();
   view.morphTargets = targets;
@@ -740,7 +740,7 @@ TEST(Bounds, RefuseWhatPackRefuses) {
   const std::array backward{MorphRange{1, 0}};
   EXPECT_EQ(jointBounds(view, 4, backward).error().code, ErrorCode::invalidArgument);
   const std::array<float, 3> displacement{1, 2, 3};
-  target.positions = floatAttribute(displacement.data(), 1, 3);
+  target.positions = attributeView(displacement.data(), 1, 3);
   EXPECT_EQ(jointBounds(view, 4).error().code, ErrorCode::invalidMesh);
   const std::array<std::uint32_t, 1> outside{10};
   target.vertices = outside;
@@ -753,7 +753,7 @@ TEST(Bounds, ReadEveryStoredForm) {
   const std::array<std::uint8_t, 4> weights{255, 0, 128, 127};
   MeshView mesh;
   mesh.vertexCount = 2;
-  mesh.positions = floatAttribute(positions.data(), 2, 3);
+  mesh.positions = attributeView(positions.data(), 2, 3);
   const InfluenceSet set{{joints.data(), 2, 2, ComponentType::uint8, 2},
                          {weights.data(), 2, 2, ComponentType::unorm8, 2}};
   mesh.influenceSets = {&set, 1};
@@ -771,7 +771,7 @@ TEST(Bounds, ReadEveryStoredForm) {
   EXPECT_EQ(bounds.joints[1].alone.reach[0], 10);
   EXPECT_TRUE(bounds.trios.empty());
   const std::array<float, 4> floats{1, 0, 0, 1};
-  const InfluenceSet ofFloats{floatAttribute(floats.data(), 2, 2), set.weights};
+  const InfluenceSet ofFloats{attributeView(floats.data(), 2, 2), set.weights};
   mesh.influenceSets = {&ofFloats, 1};
   EXPECT_EQ(boundsOf(mesh, 2).bytes(), ofBytes.bytes());
 }

@@ -34,7 +34,7 @@ TEST(Mesh, ComponentsHaveTheSizeOfTheirType) {
 
 TEST(Mesh, FloatAttributesAreTightlyPacked) {
   const float data[8] = {};
-  const AttributeView view = floatAttribute(data, 2, 4);
+  const AttributeView view = attributeView(data, 2, 4);
   EXPECT_EQ(view.data, data);
   EXPECT_EQ(view.count, 2u);
   EXPECT_EQ(view.stride, 16u);

@@ -20,7 +20,7 @@ struct NormalsTest : public testing::Test {
   NormalsTest() {
     mesh.name = "Roof";
     mesh.vertexCount = 5;
-    mesh.positions = floatAttribute(positions.data(), 5, 3);
+    mesh.positions = attributeView(positions.data(), 5, 3);
   }
 
   void expectRefused(ErrorCode code, const std::string& message) const {

@@ -200,7 +200,7 @@ TEST(Pack, FormatsAndStridesDoNotMatter) {
   EXPECT_TRUE(std::ranges::equal(expected.bytes(), packed(shorts, 100).bytes()));
 
   const std::vector<float> wholeFloats(plain.joints.begin(), plain.joints.end());
-  const InfluenceSet floatSet{floatAttribute(wholeFloats.data(), count, 2), plain.set.weights};
+  const InfluenceSet floatSet{attributeView(wholeFloats.data(), count, 2), plain.set.weights};
   MeshView floats = plain.view();
   floats.influenceSets = {&floatSet, 1};
   EXPECT_TRUE(std::ranges::equal(expected.bytes(), packed(floats, 100).bytes()));
@@ -421,11 +421,11 @@ TEST(Pack, InfluencesOfAllSetsBelongTogether) {
   const std::uint32_t joints0[] = {4, 5}, joints1[] = {6, 4};
   const float weights0[] = {0.2f, 0.1f}, weights1[] = {0.25f, 0.45f}, position[] = {0, 0, 0};
   const InfluenceSet sets[] = {
-      {{joints0, 1, 8, ComponentType::uint32, 2}, floatAttribute(weights0, 1, 2)},
-      {{joints1, 1, 8, ComponentType::uint32, 2}, floatAttribute(weights1, 1, 2)}};
+      {{joints0, 1, 8, ComponentType::uint32, 2}, attributeView(weights0, 1, 2)},
+      {{joints1, 1, 8, ComponentType::uint32, 2}, attributeView(weights1, 1, 2)}};
   MeshView mesh;
   mesh.vertexCount = 1;
-  mesh.positions = floatAttribute(position, 1, 3);
+  mesh.positions = attributeView(position, 1, 3);
   mesh.influenceSets = sets;
   const std::vector<BlobInfluence> influences = Blob(packed(mesh, 7).bytes()).influences(0);
   ASSERT_EQ(influences.size(), 3u);

@@ -53,7 +53,7 @@ TEST(Pack, WeightsOfOneJointThatAddUpToATieAreATie) {
                                       : AttributeView{bytes, 1, 3, ComponentType::unorm8, 3}};
         MeshView mesh;
         mesh.vertexCount = 1;
-        mesh.positions = floatAttribute(position, 1, 3);
+        mesh.positions = attributeView(position, 1, 3);
         mesh.influenceSets = {&set, 1};
         wrong += Blob(packed(mesh, 10).bytes()).influences(0)[0].joint == 3 ? 0 : 1;
       }
@@ -302,7 +302,7 @@ PackedMesh packShuffled(const std::vector<std::uint32_t>& joints, const std::vec
   const float position[] = {1, 2, 3};
   MeshView mesh;
   mesh.vertexCount = 1;
-  mesh.positions = floatAttribute(position, 1, 3);
+  mesh.positions = attributeView(position, 1, 3);
   mesh.influenceSets = sets;
   return packed(mesh, 100);
 }

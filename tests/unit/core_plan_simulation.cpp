@@ -511,7 +511,7 @@ PackedMesh meshOf(std::uint32_t vertices, std::uint32_t influences, std::uint32_
   }
   MeshView view = mesh.view();
   const std::vector<float> tangents(std::size_t{vertices} * 4, 1.0f);
-  if (parts.tangents) view.tangents = floatAttribute(tangents.data(), vertices, 4);
+  if (parts.tangents) view.tangents = attributeView(tangents.data(), vertices, 4);
   const std::vector<MorphTargetView> targets(parts.morphTargets);
   view.morphTargets = targets;
   Result<PackedMesh> packed = pack(view, joints);

@@ -116,7 +116,7 @@ TEST(Repair, JointsAsFloatsAreConverted) {
   std::vector<float> joints(mesh.joints.begin(), mesh.joints.end());
   joints[1 * 4 + 2] = 0.5f;
   MeshView view = mesh.view();
-  const InfluenceSet floats{floatAttribute(joints.data(), 6, 4), mesh.set.weights};
+  const InfluenceSet floats{attributeView(joints.data(), 6, 4), mesh.set.weights};
   view.influenceSets = {&floats, 1};
   const RepairedMesh result = repaired(view, 10);
   const InfluenceSet set = result.view().influenceSets[0];
@@ -132,7 +132,7 @@ TEST(Repair, ElementsThatAreNotFiniteBecomeZeroAsAWhole) {
   mesh.normals[2 * 3 + 0] = infinity;
   tangents[3 * 4 + 3] = -infinity;
   MeshView view = mesh.view();
-  view.tangents = floatAttribute(tangents.data(), 6, 4);
+  view.tangents = attributeView(tangents.data(), 6, 4);
   const RepairedMesh result = repaired(view, 10);
   const MeshView mended = result.view();
   EXPECT_EQ(vectorAt(mended.positions, 1), zero);
@@ -250,7 +250,7 @@ TEST(Repair, AFourthComponentThatIsNotReadIsLeftOut) {
   std::vector<float> withNan = values;
   withNan[4 * 4 + 3] = nan;
   MeshView view = mesh.view();
-  view.positions = view.normals = floatAttribute(withNan.data(), 6, 4);
+  view.positions = view.normals = attributeView(withNan.data(), 6, 4);
   const RepairedMesh result = repaired(view, 10);
   EXPECT_TRUE(result.report().packable());
   EXPECT_EQ(result.view().positions.components, 3u);
@@ -275,10 +275,10 @@ struct OwnedTargets {
     for (int i = 0; i < 6; ++i) sparse.push_back(static_cast<float>(i) - 3.25f);
     views[0].positions = {shorts.data(), 6, 6, ComponentType::snorm16, 3};
     views[0].positionScale = {1, 2, 3};
-    views[0].normals = floatAttribute(dense.data(), 6, 3);
+    views[0].normals = attributeView(dense.data(), 6, 3);
     views[1].vertices = vertices;
-    views[1].positions = floatAttribute(sparse.data(), 2, 3);
-    views[1].tangents = floatAttribute(sparse.data(), 2, 3);
+    views[1].positions = attributeView(sparse.data(), 2, 3);
+    views[1].tangents = attributeView(sparse.data(), 2, 3);
   }
   OwnedTargets(const OwnedTargets&) = delete;
   OwnedTargets& operator=(const OwnedTargets&) = delete;
@@ -289,7 +289,7 @@ TEST(Repair, MorphTargetsAreKept) {
   const std::vector<float> tangents(6 * 4, 0.5f);
   const OwnedTargets targets;
   MeshView view = mesh.view();
-  view.tangents = floatAttribute(tangents.data(), 6, 4);
+  view.tangents = attributeView(tangents.data(), 6, 4);
   view.morphTargets = targets.views;
   const PackedMesh before = *pack(view, 10);
   const RepairedMesh result = repaired(view, 10);

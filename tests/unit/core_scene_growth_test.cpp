@@ -5,6 +5,7 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "planned_scene.h"
@@ -153,6 +154,25 @@ TEST_F(SceneGrowthTest, FiguresAndPosesThatAreRefusedTakeNothing) {
   expectRefused(scene->addPoses(poses, riggedJoints, {.writtenByGpu = true, .rig = rig}),
                 ErrorCode::limitExceeded, "joints");
   EXPECT_TRUE(scene->addPoses(poses, riggedJoints, {.writtenByGpu = true}).ok());
+}
+
+// The rig kernel keeps the rotations of inputs, and the functions of up to 64 examples.
+TEST_F(SceneGrowthTest, PosesWithCorrectivesHaveRoomForWhatTheKernelKeeps) {
+  description.limits.minStorageBufferOffsetAlignment = 16;  // without a gap between the poses
+  create();
+  const RigHandle rig = scene->addRig(riggedPose()).value();
+  const PoseOptions options{.rig = rig};
+  const std::array poses{scene->addPose(riggedJoints, options).value(),
+                         scene->addPose(riggedJoints, options).value()};
+  std::array<BufferPart, 2> parts;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    parts[i] = owner->books().drivenPart(poses[i]).value();
+  EXPECT_EQ(parts[0].size, sizeof(JointMatrix) * drivenJoints + 4 * (givenWeights + drivenWeights));
+  if (parts[0].offset > parts[1].offset) std::swap(parts[0], parts[1]);
+  ASSERT_EQ(parts[0].buffer, parts[1].buffer);
+  const std::uint64_t firstKept = (parts[0].offset + parts[0].size + 15) / 16 * 16;
+  constexpr std::uint64_t mostInputs = 2;
+  EXPECT_LE(firstKept + 16 * mostInputs + 4 * maxRigExamples, parts[1].offset);
 }
 
 TEST_F(SceneGrowthTest, AttributesThatTheDeviceCannotBindApartAreRefusedWhereTheyAreAdded) {

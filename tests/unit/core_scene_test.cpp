@@ -110,7 +110,7 @@ std::vector<std::string> namesOf(const PlannedScene& scene) {
   for (const Command& command : scene.planned.commands()) {
     if (const auto* dispatch = std::get_if<DispatchCommand>(&command)) {
       const Kernel kernel = variantOf(dispatch->pipeline).kernel;
-      names.push_back(std::string(dispatch->indirectOffset ? "indirect " : "") +
+      names.push_back(std::string(dispatch->indirect.size != 0 ? "indirect " : "") +
                       (kernel == Kernel::palette      ? "palette"
                        : kernel == Kernel::skin       ? "skin"
                        : kernel == Kernel::clear      ? "clear"

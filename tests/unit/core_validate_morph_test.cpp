@@ -34,9 +34,9 @@ struct ValidateMorphs : public ::testing::Test {
       values->assign(vertexCount * 3, 0.5f);
     for (MorphTargetView& target : targets) {
       const std::uint32_t count = &target == &targets[0] ? vertexCount : 3;
-      target.positions = floatAttribute(positions.data(), count, 3);
-      target.normals = floatAttribute(normals.data(), count, 3);
-      target.tangents = floatAttribute(tangents.data(), count, 3);
+      target.positions = attributeView(positions.data(), count, 3);
+      target.normals = attributeView(normals.data(), count, 3);
+      target.tangents = attributeView(tangents.data(), count, 3);
     }
     targets[1].vertices = vertices;
     view.morphTargets = targets;
@@ -196,7 +196,7 @@ TEST_F(ValidateMorphs, EveryDisplacementCounts) {
   for (MorphTargetView& target : targets) {
     target = {};
     target.vertices = four;
-    target.positions = floatAttribute(bad, 1, 3);
+    target.positions = attributeView(bad, 1, 3);
   }
   onlyFinding(MeshProblem::nonFiniteMorph, 2, 4);
 }

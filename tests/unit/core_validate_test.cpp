@@ -36,7 +36,7 @@ struct ValidateTest : public ::testing::Test {
       mesh.bulgeStrengths.push_back(1 - static_cast<float>(vertex) / 9);
     }
     view = mesh.view();
-    view.tangents = floatAttribute(tangents.data(), vertexCount, 4);
+    view.tangents = attributeView(tangents.data(), vertexCount, 4);
     set = mesh.set;
     view.influenceSets = {&set, 1};
   }
@@ -392,7 +392,7 @@ TEST_F(ValidateTest, AFourthComponentThatIsNotReadMayBeAnything) {
   std::vector<float> values;
   for (std::size_t vertex = 0; vertex < vertexCount; ++vertex)
     values.insert(values.end(), {0, 1, 0, nan});
-  view.positions = floatAttribute(values.data(), vertexCount, 4);
+  view.positions = attributeView(values.data(), vertexCount, 4);
   EXPECT_TRUE(findsNothing());
   view.normals = view.positions;
   EXPECT_TRUE(findsNothing());
@@ -478,7 +478,7 @@ TEST_F(ValidateTest, JointsEndWithTheLargestPose) {
 
 TEST_F(ValidateTest, JointsMayBeFloatsIfTheyAreWholeNumbers) {
   std::vector<float> joints(mesh.joints.begin(), mesh.joints.end());
-  set.joints = floatAttribute(joints.data(), vertexCount, 4);
+  set.joints = attributeView(joints.data(), vertexCount, 4);
   EXPECT_TRUE(findsNothing());
   joints[6 * 4] = -0.0f;
   EXPECT_TRUE(findsNothing());
@@ -540,7 +540,7 @@ TEST_F(ValidateTest, TheSumIsOverAllSetsTogether) {
   std::vector<std::uint32_t> joints(vertexCount * 4, 20);
   const InfluenceSet sets[] = {set,
                                {{joints.data(), vertexCount, 16, ComponentType::uint32, 4},
-                                floatAttribute(half.data(), vertexCount, 4)}};
+                                attributeView(half.data(), vertexCount, 4)}};
   view.influenceSets = sets;
   EXPECT_TRUE(findsNothing());
   half[6 * 4] = 0.5f;
@@ -610,7 +610,7 @@ TEST_F(ValidateTest, DuplicatesAcrossSets) {
   std::vector<std::uint8_t> joints(vertexCount, 0);
   const InfluenceSet sets[] = {set,
                                {{joints.data(), vertexCount, 1, ComponentType::uint8, 1},
-                                floatAttribute(none.data(), vertexCount, 1)}};
+                                attributeView(none.data(), vertexCount, 1)}};
   view.influenceSets = sets;
   EXPECT_TRUE(findsNothing());
   joints[6] = 7;

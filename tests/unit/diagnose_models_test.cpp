@@ -116,8 +116,7 @@ struct PosedPart {
 Matrices globalsOf(const PosedPart& part, const Matrices& locals) {
   Matrices globals = locals;
   for (const std::uint32_t node : part.model->nodeOrder)
-    if (part.parents[node] != gltf::none)
-      globals[node] = globals[part.parents[node]] * locals[node];
+    if (part.parents[node] != noIndex) globals[node] = globals[part.parents[node]] * locals[node];
   return globals;
 }
 
@@ -135,7 +134,7 @@ void pose(PosedPart& part, std::uint32_t clip, double time) {
     part.globals.push_back(matrixOf(global));
   part.locals = part.globals;
   for (std::size_t node = 0; node < part.locals.size(); ++node) {
-    if (part.parents[node] == gltf::none) continue;
+    if (part.parents[node] == noIndex) continue;
     const dmat4& parent = part.globals[part.parents[node]];
     part.locals[node] =
         glm::determinant(dmat3(parent)) != 0 ? glm::inverse(parent) * part.globals[node] : dmat4(1);
@@ -249,7 +248,7 @@ class Mistakes {
   /// The nodes from the root to this one.
   std::vector<std::uint32_t> path(std::uint32_t node) const {
     std::vector<std::uint32_t> nodes;
-    for (; node != gltf::none; node = part_.parents[node]) nodes.insert(nodes.begin(), node);
+    for (; node != noIndex; node = part_.parents[node]) nodes.insert(nodes.begin(), node);
     return nodes;
   }
 
@@ -514,7 +513,7 @@ int forEachPose(const std::filesystem::path& data, const Choice& choice,
       const auto clips = static_cast<std::uint32_t>(model->clips.size());
       for (std::uint32_t clip = 0; clip < std::max(clips, 1u); ++clip) {
         for (const double time : choice.times) {
-          pose(part, clips == 0 ? gltf::none : clip,
+          pose(part, clips == 0 ? noIndex : clip,
                clips == 0 ? 0 : time * model->clips[clip].duration);
           call(part, files[file].filename().string() + ", " + primitive.name + ", clip " +
                          std::to_string(clip) + " at " + std::to_string(time));

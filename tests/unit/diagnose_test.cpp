@@ -80,7 +80,7 @@ class Rig {
     MeshView mesh;
     mesh.name = "figure";
     mesh.vertexCount = count;
-    mesh.positions = floatAttribute(&positions_[0].x, count, 3);
+    mesh.positions = attributeView(&positions_[0].x, count, 3);
     mesh.influenceSets = sets_;
     return mesh;
   }

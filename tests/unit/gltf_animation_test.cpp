@@ -203,7 +203,7 @@ TEST(GltfAnimation, LeavesOtherNodesAtRest) {
   EXPECT_EQ(globals[2][0][3], 6) << "a child follows";
   EXPECT_EQ(globals[2][1][3], 1);
   EXPECT_EQ(globals[0][0][3], 0);
-  EXPECT_EQ(nodeGlobals(model, gltf::none, 1)[1][0][3], 0) << "the rest pose";
+  EXPECT_EQ(nodeGlobals(model, noIndex, 1)[1][0][3], 0) << "the rest pose";
   EXPECT_EQ(nodeGlobals(model, 77, 1)[1][0][3], 0) << "a clip that does not exist";
 }
 
@@ -221,7 +221,7 @@ TEST(GltfAnimation, TakesApartTheMatrixOfANodeThatMoves) {
       EXPECT_NEAR(global[row][column], expected[row][column], 1e-14) << row << ' ' << column;
     }
   }
-  EXPECT_EQ(nodeGlobals(model, gltf::none, 0)[1][2][3], 3);
+  EXPECT_EQ(nodeGlobals(model, noIndex, 0)[1][2][3], 3);
 }
 
 TEST(GltfAnimation, TakesApartEveryQuarterTurn) {

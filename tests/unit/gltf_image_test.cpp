@@ -38,7 +38,7 @@ std::string imageText(const gltf::Model& model) {
 TEST(GltfImageTest, AreNotReadUnlessWanted) {
   const gltf::Model model = loaded(textured({{"uri", "data:;base64,YWJj"}}));
   EXPECT_TRUE(model.images.empty());
-  EXPECT_EQ(model.materials.at(0).baseColorTexture.image, gltf::none);
+  EXPECT_EQ(model.materials.at(0).baseColorTexture.image, noIndex);
 }
 
 TEST(GltfImageTest, ComeFromDataUris) {
@@ -74,7 +74,7 @@ TEST(GltfImageTest, ComeFromFilesInTheFolderAlone) {
     SCOPED_TRACE(uri);
     const gltf::Model model = loadedWithImages(textured({{"uri", uri}}), folder / "inside");
     EXPECT_TRUE(model.images.at(0).bytes.empty());
-    EXPECT_EQ(model.materials.at(0).baseColorTexture.image, gltf::none);
+    EXPECT_EQ(model.materials.at(0).baseColorTexture.image, noIndex);
     EXPECT_EQ(model.notes.size(), 1u);
   }
 }
@@ -85,7 +85,7 @@ TEST(GltfImageTest, WrongOnesCostAPictureAndNoMore) {
         Json{{"bufferView", "x"}}, Json{{"uri", "data:;base64,%%%"}}, Json(7), Json(nullptr)}) {
     SCOPED_TRACE(image.dump());
     const gltf::Model model = loadedWithImages(textured(image));
-    EXPECT_EQ(model.materials.at(0).baseColorTexture.image, gltf::none);
+    EXPECT_EQ(model.materials.at(0).baseColorTexture.image, noIndex);
     EXPECT_EQ(model.notes.size(), 1u);
   }
 }
@@ -93,7 +93,7 @@ TEST(GltfImageTest, WrongOnesCostAPictureAndNoMore) {
 TEST(GltfImageTest, WrongTexturesAreNone) {
   const Json image = {{"uri", "data:;base64,YWJj"}};
   const auto expectNone = [](const FileBuilder& file) {
-    EXPECT_EQ(loadedWithImages(file).materials.at(0).baseColorTexture.image, gltf::none)
+    EXPECT_EQ(loadedWithImages(file).materials.at(0).baseColorTexture.image, noIndex)
         << file.text();
   };
   for (const char* section : {"textures", "images"}) {

@@ -45,7 +45,7 @@ TEST(GltfModels, AllLoad) {
       for (std::uint32_t node = 0; node < model.nodes.size(); ++node) {
         const std::uint32_t mesh = model.nodes[node].mesh;
         EXPECT_EQ(morphWeights(model, node, clip, model.clips[clip].duration / 3).size(),
-                  mesh == gltf::none ? 0u : model.meshes.at(mesh).morphTargetCount);
+                  mesh == noIndex ? 0u : model.meshes.at(mesh).morphTargetCount);
       }
     }
   }

@@ -34,12 +34,12 @@ FileBuilder animated(const Floats& times, const Floats& values, const char* inte
 
 TEST(GltfMorph, TheClipGoesBeforeTheNodeAndTheNodeBeforeTheMesh) {
   FileBuilder file = animated({0, 1}, {3, 4, 5, 6}, "STEP");
-  EXPECT_EQ(morphWeights(loaded(file), 0, gltf::none, 0), (Floats{0, 0}));
+  EXPECT_EQ(morphWeights(loaded(file), 0, noIndex, 0), (Floats{0, 0}));
   file.json["meshes"][0]["weights"] = {0.25, 0.5};
-  EXPECT_EQ(morphWeights(loaded(file), 0, gltf::none, 0), (Floats{0.25f, 0.5f}));
+  EXPECT_EQ(morphWeights(loaded(file), 0, noIndex, 0), (Floats{0.25f, 0.5f}));
   file.json["nodes"][0]["weights"] = {0, 0.125};
   const gltf::Model model = loaded(file);
-  EXPECT_EQ(morphWeights(model, 0, gltf::none, 0), (Floats{0, 0.125f}));
+  EXPECT_EQ(morphWeights(model, 0, noIndex, 0), (Floats{0, 0.125f}));
   EXPECT_EQ(morphWeights(model, 0, 7, 0), (Floats{0, 0.125f})) << "there is no such clip";
   EXPECT_EQ(morphWeights(model, 0, 0, 0), (Floats{3, 4}));
 }
@@ -127,10 +127,10 @@ TEST(GltfMorph, ASplineThatLeavesTheRangeOfAFloatStaysFinite) {
 TEST(GltfMorph, ThereAreNoneWithoutTargetsOrMesh) {
   FileBuilder file = morphed();
   const gltf::Model model = loaded(file);
-  EXPECT_TRUE(morphWeights(model, 1, gltf::none, 0).empty()) << "a node without a mesh";
-  EXPECT_TRUE(morphWeights(model, 99, gltf::none, 0).empty()) << "no such node";
-  EXPECT_TRUE(morphWeights(model, gltf::none, 0, 0).empty());
-  EXPECT_TRUE(morphWeights(loaded(skinnedTriangle()), 0, gltf::none, 0).empty());
+  EXPECT_TRUE(morphWeights(model, 1, noIndex, 0).empty()) << "a node without a mesh";
+  EXPECT_TRUE(morphWeights(model, 99, noIndex, 0).empty()) << "no such node";
+  EXPECT_TRUE(morphWeights(model, noIndex, 0, 0).empty());
+  EXPECT_TRUE(morphWeights(loaded(skinnedTriangle()), 0, noIndex, 0).empty());
 }
 
 TEST(GltfMorph, AMeshThatIsNotDecodedHasItsWeights) {
@@ -138,7 +138,7 @@ TEST(GltfMorph, AMeshThatIsNotDecodedHasItsWeights) {
   file.json["nodes"][0].erase("skin");
   const gltf::Model model = loaded(file);
   EXPECT_TRUE(model.meshes.at(0).primitives.empty());
-  EXPECT_EQ(morphWeights(model, 0, gltf::none, 0), (Floats{0, 0}));
+  EXPECT_EQ(morphWeights(model, 0, noIndex, 0), (Floats{0, 0}));
 }
 
 // A cube whose two targets a clip blends between 0 and 1.
@@ -148,10 +148,10 @@ TEST(GltfMorph, ReadsARealModel) {
   const gltf::Model model =
       loaded(gltf::load(*data / "models/AnimatedMorphCube/glTF-Quantized/AnimatedMorphCube.gltf"));
   std::uint32_t node = 0;
-  while (node < model.nodes.size() && model.nodes[node].mesh == gltf::none) ++node;
+  while (node < model.nodes.size() && model.nodes[node].mesh == noIndex) ++node;
   ASSERT_LT(node, model.nodes.size());
   ASSERT_EQ(model.clips.size(), 1u);
-  EXPECT_EQ(morphWeights(model, node, gltf::none, 0), (Floats{0, 0}));
+  EXPECT_EQ(morphWeights(model, node, noIndex, 0), (Floats{0, 0}));
   bool moved = false;
   for (int step = 0; step <= 20; ++step) {
     const Floats weights = morphWeights(model, node, 0, model.clips[0].duration * step / 20);

@@ -360,7 +360,7 @@ TEST(GltfPrimitive, NotesBadMaterials) {
                                        "mesh 0 primitive 0: material is 0, and the file has "
                                        "0 materials"))
                 .material,
-            gltf::none);
+            noIndex);
   file.json["materials"] = {{{"emissiveFactor", {1, 2}}, {"alphaCutoff", 0.25}}};
   const gltf::Model model =
       expectNoted(file, "material 0: emissiveFactor is not an array of 3 numbers");
@@ -528,7 +528,7 @@ TEST(GltfPrimitive, ReadsWeightsOfAnotherNumberThanTargets) {
   FileBuilder file = skinnedTriangle();
   file.primitive()["targets"] = {{{"POSITION", 0}}, {{"POSITION", 0}}};
   const auto weightsOfNoted = [&](const char* note) {
-    return morphWeights(expectNoted(file, note), 0, gltf::none, 0);
+    return morphWeights(expectNoted(file, note), 0, noIndex, 0);
   };
   file.json["nodes"][0]["weights"] = {1, 2, 3};
   EXPECT_EQ(weightsOfNoted("node 0: it has 3 weights for 2 morph targets"), (Floats{1, 2}));

@@ -144,7 +144,7 @@ TEST(GltfRig, TheModelHasTheNumbersOfTheRig) {
   EXPECT_EQ(model.skins[0].joints, (std::vector<std::uint32_t>{1, 2, 4}));
   ASSERT_EQ(model.skins[0].inverseBindMatrices.size(), 3u);
   EXPECT_EQ(model.skins[0].inverseBindMatrices[2].m[0][3], -2);
-  EXPECT_EQ(gltf::pose(model, 0, gltf::none, 0).size(), 3u);
+  EXPECT_EQ(gltf::pose(model, 0, noIndex, 0).size(), 3u);
 
   const gltf::Primitive primitive = firstPrimitive(model);
   const gltf::Influences set = onlySet(primitive);
@@ -171,9 +171,44 @@ TEST(GltfRig, TheModelHasTheNumbersOfTheRig) {
   EXPECT_EQ(primitive.morphTargets[1].positions, old.morphTargets[0].positions);
   EXPECT_EQ(model.meshes[0].morphTargetCount, 1u);
   EXPECT_EQ(model.meshes[0].morphTargetNames, (std::vector<std::string>{"smile", "bent"}));
-  EXPECT_EQ(gltf::morphWeights(model, 0, gltf::none, 0), Floats{0.25f});
+  EXPECT_EQ(gltf::morphWeights(model, 0, noIndex, 0), Floats{0.25f});
   EXPECT_EQ(gltf::morphWeights(model, 0, 0, 1), Floats{6});
   EXPECT_EQ(gltf::skeleton(model).nodes[0].weights.size(), 1u);
+}
+
+// Its joints would no longer be those of the first rig, which the vertices have.
+TEST(GltfRig, CannotBeAppliedTwice) {
+  for (const char* const second :
+       {R"({"drivers": [{"twist": "lower", "source": "upper", "axis": [1, 0, 0]}]})",
+        R"({"drivers": [{"corrective": ["lower"], "examples": [
+             {"rotations": [[0, 0, 1, 0]], "weights": {"smile": 1}}]}]})"}) {
+    gltf::Model model = loaded(arm());
+    ASSERT_TRUE(gltf::applyRig(model, 0, R"({"drivers": [
+        {"twist": "twist", "source": "hand", "axis": [1, 0, 0]},
+        {"linear": "muscle", "terms": []}]})")
+                    .ok());
+    const gltf::Model before = model;
+    const Rig rig = gltf::applyRig(model, 0, second);
+    ASSERT_FALSE(rig.ok()) << second;
+    EXPECT_EQ(rig.error().code, ErrorCode::invalidData);
+    EXPECT_EQ(rig.error().message,
+              "skin 0 has 3 joints, but vertex 1 of mesh 0 follows joint 3: the file is wrong, "
+              "or a rig was applied to the skin before");
+    EXPECT_EQ(model.skins[0].joints, before.skins[0].joints);
+    EXPECT_EQ(onlySet(firstPrimitive(model)).joints, onlySet(firstPrimitive(before)).joints);
+  }
+}
+
+// Slots without weight may have any number.
+TEST(GltfRig, IgnoresJointsWithoutWeight) {
+  gltf::Model model = loaded(arm());
+  gltf::Influences& set = model.meshes[0].primitives[0].influences[0];
+  ASSERT_EQ(set.jointType, ComponentType::uint8);
+  std::vector<std::byte> joints(set.joints.values());
+  joints[3] = std::byte{200};
+  set.joints = joints;
+  const Rig rig = gltf::applyRig(model, 0, allDrivers);
+  EXPECT_TRUE(rig.ok()) << rig.error().message;
 }
 
 TEST(GltfRig, OtherSkinsKeepTheirMesh) {

@@ -8,7 +8,6 @@ namespace dermis::test {
 namespace {
 
 using gltf::nodeGlobals;
-using gltf::none;
 
 std::array<double, 3> translationOf(const Transform& transform) {
   return {transform[0][3], transform[1][3], transform[2][3]};
@@ -34,13 +33,14 @@ TEST(GltfNode, ComposesTranslationRotationAndScale) {
   const double half = std::sqrt(0.5);
   const gltf::Model model = loaded(withNodes(
       {{{"translation", {1, 2, 3}}, {"rotation", {0, 0, half, half}}, {"scale", {2, 3, 4}}}}));
-  expectTransform(nodeGlobals(model, none, 0)[0], {{{0, -3, 0, 1}, {2, 0, 0, 2}, {0, 0, 4, 3}}});
+  expectTransform(nodeGlobals(model, noIndex, 0)[0], {{{0, -3, 0, 1}, {2, 0, 0, 2}, {0, 0, 4, 3}}});
 }
 
 TEST(GltfNode, ReadsAMatrixByColumns) {
   const gltf::Model model =
       loaded(withNodes({{{"matrix", {1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 10, 11, 12, 1}}}}));
-  expectTransform(nodeGlobals(model, none, 0)[0], {{{1, 4, 7, 10}, {2, 5, 8, 11}, {3, 6, 9, 12}}});
+  expectTransform(nodeGlobals(model, noIndex, 0)[0],
+                  {{{1, 4, 7, 10}, {2, 5, 8, 11}, {3, 6, 9, 12}}});
 }
 
 TEST(GltfNode, MultipliesParentsFirstWhateverTheOrder) {
@@ -48,12 +48,12 @@ TEST(GltfNode, MultipliesParentsFirstWhateverTheOrder) {
   const gltf::Model model = loaded(withNodes({{{"translation", {1, 0, 0}}},
                                               {{"children", {2}}, {"scale", {10, 10, 10}}},
                                               {{"children", {0}}, {"translation", {0, 1, 0}}}}));
-  const auto globals = nodeGlobals(model, none, 0);
+  const auto globals = nodeGlobals(model, noIndex, 0);
   EXPECT_EQ(translationOf(globals[0]), (std::array<double, 3>{10, 10, 0}));
   EXPECT_EQ(translationOf(globals[2]), (std::array<double, 3>{0, 10, 0}));
   EXPECT_EQ(model.nodeOrder, (std::vector<std::uint32_t>{1, 2, 0}));
   EXPECT_EQ(model.nodes[0].parent, 2u);
-  EXPECT_EQ(model.nodes[1].parent, none);
+  EXPECT_EQ(model.nodes[1].parent, noIndex);
 }
 
 TEST(GltfNode, NormalizesRotations) {
@@ -75,7 +75,7 @@ TEST(GltfNode, FollowsADeepChain) {
     nodes.push_back(node);
   }
   const gltf::Model model = loaded(withNodes(nodes));
-  EXPECT_EQ(translationOf(nodeGlobals(model, none, 0)[0])[0], depth);
+  EXPECT_EQ(translationOf(nodeGlobals(model, noIndex, 0)[0])[0], depth);
 }
 
 TEST(GltfNode, RefusesWhatIsNoTree) {
@@ -90,7 +90,7 @@ TEST(GltfNode, RefusesWhatIsNoTree) {
   const gltf::Model model =
       expectNoted(withCycle({1, 2}), "node 3: it is part of, or below, a cycle of nodes");
   EXPECT_EQ(model.nodeOrder.size(), 7u);
-  EXPECT_EQ(nodeGlobals(model, none, 0).size(), 7u);
+  EXPECT_EQ(nodeGlobals(model, noIndex, 0).size(), 7u);
   expectInvalid(withCycle({1, 4}), "node 4: it is part of, or below, a cycle of nodes");
   expectInvalid(withCycle({1, 6}), "node 6: it is part of, or below, a cycle of nodes");
   FileBuilder file = withCycle({1, 2});
@@ -129,7 +129,7 @@ TEST(GltfNode, NotesPropertiesThatHaveNoEffect) {
       withNodes(
           {{{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}, {"scale", {2, 2, 2}}}}),
       "node 0: it has both matrix and scale");
-  EXPECT_EQ(nodeGlobals(model, none, 0)[0][0][0], 1);
+  EXPECT_EQ(nodeGlobals(model, noIndex, 0)[0][0][0], 1);
   FileBuilder file = skinnedTriangle();
   file.json["nodes"][0].erase("mesh");
   EXPECT_TRUE(expectNoted(file, "node 0: it has skin but no mesh").skinnedPrimitives.empty());
@@ -315,8 +315,8 @@ TEST(GltfScene, LoadsAFileWithNothingInIt) {
   const gltf::Model model = loaded(FileBuilder());
   EXPECT_TRUE(model.nodes.empty());
   EXPECT_TRUE(model.skinnedPrimitives.empty());
-  EXPECT_TRUE(nodeGlobals(model, none, 0).empty());
-  EXPECT_TRUE(gltf::pose(model, 0, none, 0).empty());
+  EXPECT_TRUE(nodeGlobals(model, noIndex, 0).empty());
+  EXPECT_TRUE(gltf::pose(model, 0, noIndex, 0).empty());
 }
 
 TEST(GltfScene, RefusesBadScenes) {
@@ -337,7 +337,7 @@ TEST(GltfScene, RefusesBadScenes) {
 
 TEST(GltfSkin, TakesIdentitiesWhereThereAreNoMatrices) {
   const gltf::Model model = loaded(skinnedTriangle());
-  const auto matrices = gltf::pose(model, 0, none, 0);
+  const auto matrices = gltf::pose(model, 0, noIndex, 0);
   ASSERT_EQ(matrices.size(), 2u);
   EXPECT_EQ(matrices[0].m[0][0], 1.0f);
   EXPECT_EQ(matrices[0].m[1][3], 0.0f);
@@ -355,7 +355,7 @@ TEST(GltfSkin, MultipliesJointByInverseBindMatrix) {
   matrices.insert(matrices.end(), second.begin(), second.end());
   matrices.insert(matrices.end(), second.begin(), second.end());  // One more than needed.
   file.json["skins"][0]["inverseBindMatrices"] = file.addFloats(matrices, "MAT4");
-  const auto result = gltf::pose(loaded(file), 0, none, 0);
+  const auto result = gltf::pose(loaded(file), 0, noIndex, 0);
   ASSERT_EQ(result.size(), 2u);
   // Joint 2 stands at y = 1: its translation is added to what the matrix does.
   EXPECT_EQ(result[1].m[0][0], 2.0f);
@@ -367,9 +367,9 @@ TEST(GltfSkin, MultipliesJointByInverseBindMatrix) {
 // glTF 2.0, 3.7.3.3: a skinned mesh goes where its joints are, not where its node is.
 TEST(GltfSkin, IgnoresTheSkinnedNodesTransform) {
   FileBuilder file = skinnedTriangle();
-  const auto still = gltf::pose(loaded(file), 0, none, 0);
+  const auto still = gltf::pose(loaded(file), 0, noIndex, 0);
   file.json["nodes"][0]["translation"] = {100, 200, 300};
-  const auto moved = gltf::pose(loaded(file), 0, none, 0);
+  const auto moved = gltf::pose(loaded(file), 0, noIndex, 0);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(std::memcmp(&still[i], &moved[i], sizeof still[i]), 0);
   }
@@ -384,7 +384,7 @@ TEST(GltfSkin, FollowsNodesThatAreNoJoints) {
                         {{"children", {2}}, {"translation", {0, 0, 5}}},
                         {{"children", {1}}, {"scale", {2, 2, 2}}}};
   file.json["scenes"][0]["nodes"] = {0};
-  const auto matrices = gltf::pose(loaded(file), 0, none, 0);
+  const auto matrices = gltf::pose(loaded(file), 0, noIndex, 0);
   EXPECT_EQ(matrices[1].m[0][0], 2.0f);
   EXPECT_EQ(matrices[1].m[1][3], 2.0f);
   EXPECT_EQ(matrices[1].m[2][3], 10.0f);
@@ -435,12 +435,12 @@ TEST(GltfSkin, LeavesOutABrokenSkinThatNoNodeUses) {
   gltf::Model model = expectNoted(file, "skin 0: an entry of joints is 9");
   ASSERT_EQ(model.skins.size(), 2u);
   EXPECT_TRUE(model.skins[0].joints.empty());
-  EXPECT_TRUE(gltf::pose(model, 0, none, 0).empty());
+  EXPECT_TRUE(gltf::pose(model, 0, noIndex, 0).empty());
   EXPECT_EQ(model.skinnedPrimitives.at(0).skin, 1u);
   file.json["skins"][0] = {{"joints", {1, 2}}, {"inverseBindMatrices", 0}};
   model = expectNoted(file, "skin 0 inverseBindMatrices: accessor 0 is VEC3 of float, not MAT4");
   EXPECT_TRUE(model.skins[0].joints.empty());
-  EXPECT_EQ(gltf::pose(model, 1, none, 0).size(), 2u);
+  EXPECT_EQ(gltf::pose(model, 1, noIndex, 0).size(), 2u);
 }
 
 TEST(GltfSkin, RefusesBadMatrices) {

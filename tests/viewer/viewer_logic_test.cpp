@@ -87,7 +87,7 @@ TEST(ViewerJointsTest, HasEveryJointOnceBelowOneRoot) {
     EXPECT_FALSE(joint.name.empty());
     nodes.insert(joint.node);
     if (&joint == joints.data()) continue;  // the root
-    ASSERT_NE(joint.parent, gltf::none);
+    ASSERT_NE(joint.parent, noIndex);
     EXPECT_EQ(joints[joint.parent].node, scene.model->nodes[joint.node].parent);
   }
   EXPECT_EQ(nodes.size(), joints.size());

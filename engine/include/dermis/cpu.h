@@ -133,7 +133,7 @@ DERMIS_CPU_API Result<void> setTarget(std::string_view name);
 //     scene.beginFrame(frame, frame - 1);                   // the jobs of the last frame are done
 //     std::span<JointMatrix> matrices = *scene.writePose(pose);    // for each pose that changes
 //     ... add, remove, change ...
-//     for (const cpu::PlannedJob& job : *runner.jobs()) threadPool.run([&] { cpu::skin(job); });
+//     for (const cpu::PlannedJob& job : *runner.jobs()) threadPool.run([&] { cpu::run(job); });
 //     ... wait for them, and use runner.output() at scene.output(instance)
 
 struct PlannedTask;
@@ -147,13 +147,13 @@ class PlannedJob {
 
  private:
   friend class SceneRunner;
-  friend DERMIS_CPU_API void skin(const PlannedJob& job);
+  friend DERMIS_CPU_API void run(const PlannedJob& job);
   const PlannedTask* task_ = nullptr;
   std::uint64_t vertexCount_ = 0;
 };
 
 /// Runs a job. The jobs of a frame may run on any threads, in any order and at the same time.
-DERMIS_CPU_API void skin(const PlannedJob& job);
+DERMIS_CPU_API void run(const PlannedJob& job);
 
 /// Owns a scene and the memory for it.
 ///

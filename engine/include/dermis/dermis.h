@@ -779,12 +779,10 @@ typedef enum dermis_command_kind {
 typedef struct dermis_dispatch {
   uint64_t pipeline;                      // `dermis_describe_pipeline`
   uint32_t group_count_x, group_count_y;  // 0 if indirect
-  uint32_t is_indirect;
-  uint32_t constant_count;
-  uint64_t indirect_offset;  // of the arguments, in bytes from the beginning of the buffer of
-                             // bindings[0]
+  // Where the arguments of vkCmdDispatchIndirect are, if indirect; otherwise of 0 bytes.
+  dermis_part indirect;
   const dermis_binding* bindings;
-  uint32_t binding_count;
+  uint32_t binding_count, constant_count;
   uint32_t constants[9];  // push constants from offset 0
 } dermis_dispatch;
 // Bytes of the CPU that are copied to a buffer; valid as long as the command.
@@ -1141,9 +1139,12 @@ typedef struct dermis_bank_info {
   uint32_t skin_count, clip_count, mask_count;
   const uint32_t* joint_counts;   // of each skin
   const dermis_clip_info* clips;  // of each clip
-  double worst_error;             // of the poses; 0 if the bank was loaded from bytes
-  const char* worst;              // where: clip, node and time
-  uint32_t has_root_motion;       // whether it was taken out of the clips
+  // What `dermis_pack_clips` reports; zeros if the bank was loaded from bytes.
+  double worst_error, max_error;      // of whole poses, and what was asked for
+  double slowest_rate, fastest_rate;  // keys a second of tracks with keys
+  uint64_t key_count;
+  const char* worst;         // where the error is: clip, node and time
+  uint32_t has_root_motion;  // whether it was taken out of the clips
   // The nodes of the skeleton with morph weights, and how many each has.
   uint32_t morphed_node_count;
   const uint32_t* morphed_nodes;
@@ -1470,7 +1471,7 @@ typedef struct dermis_created_buffer {
 // grow. `dermis_recorder_requirement` says what they need.
 typedef struct dermis_recorder_desc {
   uint32_t size;
-  VkBufferUsageFlags output_usage;  // 0: VERTEX_BUFFER; add TRANSFER_SRC to read vertices back
+  VkBufferUsageFlags output_usage;  // of the engine, if created here; 0: VERTEX_BUFFER
   const dermis_scene_desc* scene;   // null: the defaults
   const dermis_tuning* tuning;      // null: that of the context
   dermis_range meshes, poses, gpu_poses, output;

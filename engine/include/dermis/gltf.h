@@ -29,14 +29,12 @@
 
 namespace dermis::gltf {
 
-inline constexpr std::uint32_t none = 0xffffffffu;  ///< the index of nothing
-
 /// A node: its local transform and what it contains. All numbers are finite.
 struct Node {
   std::string name;
-  std::uint32_t parent = none;  ///< index into `Model::nodes`
-  std::uint32_t mesh = none;    ///< index into `Model::meshes`
-  std::uint32_t skin = none;    ///< index into `Model::skins`; only nodes with a mesh have one
+  std::uint32_t parent = noIndex;  ///< index into `Model::nodes`
+  std::uint32_t mesh = noIndex;    ///< index into `Model::meshes`
+  std::uint32_t skin = noIndex;    ///< index into `Model::skins`; only nodes with a mesh have one
   std::array<double, 3> translation{0, 0, 0};
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w, of unit length
   std::array<double, 3> scale{1, 1, 1};
@@ -75,8 +73,8 @@ enum class Wrap : std::uint8_t { repeat = 0, mirroredRepeat = 1, clampToEdge = 2
 
 /// A texture of a material.
 struct TextureUse {
-  std::uint32_t image = none;  ///< index into `Model::images`; that image has bytes
-  std::uint32_t texcoord = 0;  ///< n of TEXCOORD_n; a primitive need not have it
+  std::uint32_t image = noIndex;  ///< index into `Model::images`; that image has bytes
+  std::uint32_t texcoord = 0;     ///< n of TEXCOORD_n; a primitive need not have it
   Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
 };
 
@@ -148,8 +146,8 @@ struct Influences {
 /// One decoded primitive of a mesh. Attributes are float32 whatever the file stores: normalized
 /// integers are divided by their maximum. Influences keep their types. Vertices are in the order of
 /// the accessors, or of the decoder if Draco compresses the primitive, unless
-/// `MissingNormals::flat` repeats them. Values are those of the
-/// file, so they may be NaN, and joint indices may be outside the skin: `validate` checks both.
+/// `MissingNormals::flat` repeats them. Values are those of the file, so they may be NaN, and joint
+/// indices may be outside the skin: `validate` checks both.
 struct Primitive {
   /// For messages, which put it in quotes: "Fox" if its mesh has no other primitive, otherwise "Fox
   /// primitive 1". "number 3" instead of "Fox" if mesh 3 has no name. Short, on one line,
@@ -167,7 +165,7 @@ struct Primitive {
   /// 3 vertex indices per triangle. Strips and fans are converted. Empty for points and lines.
   SharedArray<std::uint32_t> triangles;
   std::vector<MorphTarget> morphTargets;
-  std::uint32_t material = none;  ///< index into `Model::materials`
+  std::uint32_t material = noIndex;  ///< index into `Model::materials`
 
   /// Influences of all sets together. Some may have weight 0.
   std::uint32_t influencesPerVertex() const {
@@ -213,7 +211,7 @@ using dermis::Interpolation;
 
 /// One animated property of one node. A clip has at most one channel for a node and a path.
 struct Channel {
-  std::uint32_t node = none;
+  std::uint32_t node = noIndex;
   ChannelPath path = ChannelPath::translation;
   Interpolation interpolation = Interpolation::linear;
   std::uint32_t components = 3;  ///< values per key: 3, 4, or the number of morph targets
@@ -234,13 +232,13 @@ struct Clip {
 /// One skinned primitive of the default scene. If several nodes use a mesh with different skins,
 /// each node has its own. All indices are valid.
 struct SkinnedPrimitive {
-  std::uint32_t node = none;
-  std::uint32_t mesh = none;
-  std::uint32_t primitive = none;
-  std::uint32_t skin = none;
+  std::uint32_t node = noIndex;
+  std::uint32_t mesh = noIndex;
+  std::uint32_t primitive = noIndex;
+  std::uint32_t skin = noIndex;
 };
 
-/// The contents of a file. Every index is in range or `none`. The nodes form trees.
+/// The contents of a file. Every index is in range or `noIndex`. The nodes form trees.
 struct Model {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> nodeOrder;  ///< indices of all nodes, parents before their children
@@ -366,15 +364,15 @@ DERMIS_GLTF_API Result<std::vector<std::string>> addClips(Model& model, Model fr
 ///
 /// Fails, and then leaves the model unchanged, with
 /// - `invalidArgument` if there is no such skin;
-/// - `invalidData` if the text is wrong. The message names the driver by its number and what is
-///   wrong about it;
+/// - `invalidData` if the text is wrong; the message names the driver by its number and what is
+///   wrong about it. Also if a vertex follows a joint that the skin does not have;
 /// - `limitExceeded` if there are more than 65,535 joints, more than `maxRigExamples` examples, or
 ///   if it needs more memory than the sizes of the model's files and of the text justify.
 DERMIS_GLTF_API Result<std::shared_ptr<const RigView>> applyRig(Model& model, std::uint32_t skin,
                                                                 std::string_view text);
 
-/// The global transforms of all nodes at a time of a clip, in seconds. If `clip` is `none` or does
-/// not exist, it is the rest pose.
+/// The global transforms of all nodes at a time of a clip, in seconds. If `clip` is `noIndex` or
+/// does not exist, it is the rest pose.
 ///
 /// The time is clamped to the keys of each channel; NaN counts as a time before the first key. For
 /// a loop, pass the time modulo `Clip::duration`. At a key the result is the value of the key.

@@ -13,6 +13,9 @@
 
 namespace dermis {
 
+/// The index of nothing, for example of the parent of a root.
+inline constexpr std::uint32_t noIndex = 0xffffffff;
+
 /// An axis-aligned box.
 struct Box {
   float min[3] = {0, 0, 0};  ///< x, y, z

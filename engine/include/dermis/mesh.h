@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "dermis/layout.h"
@@ -196,10 +197,18 @@ struct MeshView {
   AttributeView centersOfRotation;
 };
 
-/// A view of float32 values. `stride` is in bytes; 0 if elements are tightly packed.
-inline AttributeView floatAttribute(const float* data, std::uint32_t count,
-                                    std::uint32_t components, std::uint32_t stride = 0) {
-  return {data, count, stride != 0 ? stride : components * 4, ComponentType::float32, components};
+/// A view of float32 values or of joint indices. `stride` is in bytes; 0 if elements are tightly
+/// packed.
+template <typename T>
+AttributeView attributeView(const T* data, std::uint32_t count, std::uint32_t components,
+                            std::uint32_t stride = 0) {
+  static_assert(std::is_same_v<T, float> || (std::is_unsigned_v<T> && sizeof(T) <= 4));
+  constexpr ComponentType type = std::is_same_v<T, float> ? ComponentType::float32
+                                 : sizeof(T) == 1         ? ComponentType::uint8
+                                 : sizeof(T) == 2         ? ComponentType::uint16
+                                                          : ComponentType::uint32;
+  constexpr std::uint32_t size = sizeof(T);
+  return {data, count, stride != 0 ? stride : components * size, type, components};
 }
 
 // ---- Computes normals for a mesh that has none. This is done once, at import, before `pack`.

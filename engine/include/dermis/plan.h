@@ -33,11 +33,10 @@ struct DeviceLimits {
   /// `storageBuffersWanted`, all attributes of a job must go to one buffer, as if `separateRanges`
   /// were false. Bounds and snorm16 positions are then not available.
   std::uint32_t maxStorageBuffersPerStage = 4;
-  /// Whether one dispatch may bind a different window of the output buffer for each attribute. If
-  /// false, and the output buffer is larger than a storage buffer range, the attributes of each
-  /// vertex must lie in one `OutputWindow`. They do if they begin within 1/32 of a storage buffer
-  /// range of each other. `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is not
-  /// enabled.
+  /// Whether one dispatch may bind another part of the output buffer for each attribute. If false,
+  /// and the output buffer is larger than `maxStorageBufferRange`, the attributes of a vertex must
+  /// lie in one part of that size. They do if none begins more than 1/32 of it after another.
+  /// `vulkan::Context::limits` returns false if VK_KHR_push_descriptor is not enabled.
   bool separateRanges = true;
   /// Whether kernels are those for CPU devices. They read tables, meshes and palettes, and in a
   /// batch with `Method::linear` poses, through uniform texel buffers, and store an attribute, or
@@ -73,10 +72,10 @@ struct Tuning {
   /// until it has enough workgroups or one instance per invocation. 0: always
   /// `instancesPerInvocation`. Needs no other pipeline.
   std::uint32_t minWorkgroups = 0;
-  /// Maximum vertices that one invocation skins, one after the other: a power of two from 1 to 16.
-  /// A dispatch uses the largest power of two v that leaves at least 32 workgroups and for which v
-  /// × m is at most `instancesPerInvocation`. m is the mean number of instances of each mesh and
-  /// layout in the dispatch. Used only with `DeviceLimits::texelBuffers`. Needs no other pipeline.
+  /// Maximum vertices of a mesh that one invocation skins, one after the other: a power of two from
+  /// 1 to 16. For dispatches with few instances of each mesh: they use as many as leave at least 32
+  /// workgroups and, for the mean number of instances, at most `instancesPerInvocation` skinned
+  /// vertices an invocation. Used only with `DeviceLimits::texelBuffers`. Needs no other pipeline.
   std::uint32_t verticesPerInvocation = 1;
 };
 
@@ -84,10 +83,10 @@ struct Tuning {
 struct PoseDescription {
   std::uint32_t jointCount = 0;    ///< 1 to `maxPoseJoints`
   std::uint64_t matrixOffset = 0;  ///< bytes into the poses buffer, a multiple of 16
-  /// `scaling` takes 32 more bytes of the palettes buffer per joint and, on lavapipe, more time
-  /// even if no joint scales. Otherwise joints that scale are counted in `PoseStatus`. But
-  /// `Method::linear` always applies scale and shear; without `scaling`, its normals and tangents
-  /// are right only for scales between 2^-20 and 2^30.
+  /// What the joints do. `scaling` takes 32 more bytes of the palettes buffer for each joint and,
+  /// on lavapipe, more time. With another promise, joints that scale are counted in `PoseStatus`,
+  /// and only `Method::linear` applies their scale; its normals and tangents are then right for
+  /// scales between 2^-20 and 2^30.
   JointPromise promise = JointPromise::scaling;
 };
 
@@ -116,8 +115,8 @@ struct Job {
   /// teleport. Otherwise they are those of the last time that the instance was skinned; snorm16
   /// values stay relative to the box that they were written with.
   bool restartsMotion = false;
-  /// Does not skin the instance, but sets its previous positions to the positions in the output:
-  /// for the first frame in which an instance no longer moves. Requires previous positions, as
+  /// Only copies the positions in the output to the previous positions, and skins nothing: for the
+  /// first frame in which an instance no longer moves. Requires previous positions, as
   /// `restartsMotion` does.
   bool settles = false;
 
@@ -145,7 +144,8 @@ static_assert(sizeof(InstanceResult) == 32);
 
 /// Everything that one `record` skins, and the sizes of its buffers.
 struct Batch {
-  /// Jobs refer to them by index. Each is converted at most once for each form that methods need.
+  /// Jobs refer to them by index. A pose is converted once for all jobs that read it and whose
+  /// methods need the same palette.
   std::span<const PoseDescription> poses;
   std::span<const Job> jobs;     ///< one for each instance
   std::uint64_t meshesSize = 0;  ///< bytes of the mesh buffer
@@ -165,8 +165,8 @@ enum class PipelineId : std::uint64_t {};
 
 /// All pipelines that a job like this one can need, with any mesh, pose and morph targets, in any
 /// batch, to be built while loading. Jobs are alike if they have the same method, formats, strides,
-/// motion and bounds, and if each offset differs by a multiple of 4 bytes. Offsets of attributes of
-/// one interleaved vertex must all differ by the same number.
+/// motion and bounds, and if their vertices begin a multiple of 4 bytes later or earlier: all
+/// attributes of an interleaved vertex by the same number of bytes, each array by its own.
 ///
 /// They are: the palette kernel for each promise of poses, but for `linear`; the clear kernel, for
 /// bounds and snorm16 positions; and the skin kernel for at most 1, 2 and 4 influences, for exactly
@@ -219,7 +219,8 @@ enum class BufferRole : std::uint8_t {
   tables = 2,
   palettes = 3,           ///< what the palette kernel writes: palettes and `PoseStatus`
   results = 4,            ///< `InstanceResult`
-  positions = 5,          ///< skinned positions; in a scene, all attributes
+  positions = 5,          ///< skinned positions
+  output = 5,             ///< in a scene: skinned vertices, all attributes
   normals = 6,            ///< skinned normals
   tangents = 7,           ///< skinned tangents
   previousPositions = 8,  ///< positions of the previous frame
@@ -241,15 +242,15 @@ struct BufferRequirement {
   std::uint32_t usage = 0;
 };
 
-/// The number of a buffer in commands. In a batch it is its `BufferRole`. In a scene it is the
-/// `SceneBuffer::number`, or `visibilityBuffer`.
-inline constexpr std::uint32_t noBuffer = 0xffffffff;
-/// In a scene: the buffer of visibility words, which the engine has (`Scene::visibilityCount`).
+/// In a scene: the number of the buffer of visibility words, which the engine has
+/// (`Scene::visibilityCount`).
 inline constexpr std::uint32_t visibilityBuffer = 0;
 
 /// A part of a buffer. Bytes.
 struct BufferPart {
-  std::uint32_t buffer = noBuffer;  ///< its number
+  /// Its number in commands. In a batch it is its `BufferRole`. In a scene it is the
+  /// `SceneBuffer::number`, or `visibilityBuffer`.
+  std::uint32_t buffer = noIndex;
   std::uint64_t offset = 0, size = 0;
 };
 
@@ -271,9 +272,8 @@ struct DispatchCommand {
   std::uint32_t groupCountY = 0;  ///< the third count is 1
   /// Workgroups that do work. `groupCountX` × `groupCountY` may be a little larger. 0 if indirect.
   std::uint32_t workgroupCount = 0;
-  /// If indirect: where the VkDispatchIndirectCommand is, in bytes from the beginning of the buffer
-  /// of `bindings[0]`.
-  std::optional<std::uint64_t> indirectOffset;
+  /// Where the VkDispatchIndirectCommand is, if indirect; otherwise of size 0.
+  BufferPart indirect;
   /// Push constants from offset 0, the first `constantCount` words: the structure of
   /// shaders/abi.h that is named after the kernel, such as SkinPush.
   std::array<std::uint32_t, 9> constants{};
@@ -308,12 +308,12 @@ enum class Use : std::uint32_t {
   /// All that a plan reads and writes. A scene orders its own frames; between two records of
   /// batches with the same buffers, the engine records a barrier.
   dermis = 1,
-  vertexInput = 2,   ///< draws, as a vertex buffer
-  vertexShader = 4,  ///< this and the next four: as a storage or texel buffer that is only read
-  fragmentShader = 8,
-  taskShader = 16,  ///< of VK_EXT_mesh_shader
-  meshShader = 32,
-  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline
+  vertexInput = 2,                   ///< draws, as a vertex buffer
+  vertexShader = 4,                  ///< reads it as a storage or texel buffer, as do the next four
+  fragmentShader = 8,                ///< reads it
+  taskShader = 16,                   ///< of VK_EXT_mesh_shader, reads it
+  meshShader = 32,                   ///< reads it
+  rayTracing = 64,                   ///< any shader of a ray-tracing pipeline reads it
   accelerationStructureBuild = 128,  ///< the geometry of a build or refit
   computeRead = 256,
   computeWrite = 512,
@@ -407,7 +407,7 @@ class DERMIS_CORE_API Plan {
 /// - `missingFeature` if this build lacks the kernels of the method;
 /// - `limitExceeded` if meshes, poses, palettes or tables are larger than a storage buffer range,
 ///   if a dispatch has too many workgroups, if the device has too few storage buffers for a job, or
-///   if the attributes of a vertex must lie in one `OutputWindow` and do not
+///   if the attributes of a vertex must lie in one storage buffer range and do not
 ///   (`DeviceLimits::separateRanges`).
 ///
 /// After a failure the plan is empty.

@@ -34,7 +34,7 @@ namespace dermis {
 struct RigJoint {
   /// The joint above it. The matrix of a driven joint is computed relative to that of its parent.
   /// Without one it is relative to the space of the pose.
-  std::uint32_t parent = 0xffffffffu;
+  std::uint32_t parent = noIndex;
   /// The joint's global transform in bind pose: the inverse of its inverse bind matrix.
   JointMatrix bind = {};
 };
@@ -113,7 +113,7 @@ struct RigView {
   std::uint32_t givenWeights = 0;   ///< the first weights
   std::uint32_t drivenWeights = 0;  ///< the others
   /// For figures: the node of the skeleton whose morph weights are the given ones.
-  std::uint32_t weightsOf = 0xffffffffu;
+  std::uint32_t weightsOf = noIndex;
   std::span<const TwistDriver> twists = {};
   std::span<const CorrectiveDriver> correctives = {};
   std::span<const ChainDriver> chains = {};

@@ -45,12 +45,12 @@ struct Handle {
   explicit operator bool() const { return generation != 0; }
 };
 
-using MeshHandle = Handle<struct MeshOfSystem>;          ///< a mesh
-using PoseHandle = Handle<struct PoseOfSystem>;          ///< a pose
-using InstanceHandle = Handle<struct InstanceOfSystem>;  ///< an instance
-using ClipsHandle = Handle<struct ClipsOfSystem>;        ///< a bank of clips
-using FigureHandle = Handle<struct FigureOfSystem>;      ///< what plays clips
-using RigHandle = Handle<struct RigOfSystem>;            ///< a rig
+using MeshHandle = Handle<struct MeshOfScene>;          ///< a mesh
+using PoseHandle = Handle<struct PoseOfScene>;          ///< a pose
+using InstanceHandle = Handle<struct InstanceOfScene>;  ///< an instance
+using ClipsHandle = Handle<struct ClipsOfScene>;        ///< a bank of clips
+using FigureHandle = Handle<struct FigureOfScene>;      ///< what plays clips
+using RigHandle = Handle<struct RigOfScene>;            ///< a rig
 
 /// How much a buffer holds. It grows if something is added that does not fit.
 struct Capacity {
@@ -87,9 +87,9 @@ struct SceneDescription {
 
 /// What is fixed when a pose is added.
 struct PoseOptions {
-  /// Who writes the joint matrices. If false: the CPU, to memory that `writePose` returns in each
-  /// frame. If true: a GPU pass of the engine, always to the same memory; the engine then calls
-  /// `markWritten`.
+  /// Whether a GPU pass of the engine writes the joint matrices, always to the same memory, after
+  /// which the engine calls `markWritten`. Otherwise the CPU writes them, to memory that
+  /// `writePose` returns in each frame.
   bool writtenByGpu = false;
   /// As `PoseDescription::promise`. That of a pose with a rig includes driven joints: they keep
   /// that of the others if `PackedRig::isRigid`.
@@ -155,7 +155,7 @@ struct InstanceDescription {
   /// With `MorphWriter::clips`: the node of the skeleton whose weights drive the instance. The bank
   /// must have as many for it as the mesh has targets that no rig drives
   /// (`PackedClips::weightCount`).
-  std::uint32_t weightsOf = 0xffffffffu;
+  std::uint32_t weightsOf = noIndex;
   /// The number of the mesh's last morph targets whose weights are those of the rig of the pose,
   /// consecutive from `firstDrivenWeight` on. They are not active while the pose has no rig.
   /// `morphWriter` writes the targets before them.
@@ -205,7 +205,7 @@ struct InstanceOutput {
   bool isWritten = false;
   /// The mesh that the instance was last skinned with. After a change of mesh it is the old mesh
   /// until the instance is skinned again. For an instance that is culled on the GPU it is the old
-  /// mesh until the next `commit`.
+  /// mesh until the next frame is executed.
   MeshHandle mesh;
   /// Bytes from the beginning of the buffer. For interleaved layouts it is a multiple of the
   /// stride, so that a draw can use `firstVertex` instead of a vertex-buffer offset.
@@ -239,7 +239,7 @@ struct StoreStatistics {
   std::uint64_t largestFree = 0;  ///< size of the largest free range
 };
 
-/// What the frame of the last `commit` does; zeros after `abandonFrame`. Skinned and settled
+/// What the last frame that was executed does; zeros after `abandonFrame`. Skinned and settled
 /// instances, vertices and bytes written do not include instances culled on the GPU.
 struct FrameStatistics {
   std::uint64_t frame = 0;
@@ -249,7 +249,7 @@ struct FrameStatistics {
   /// Figures whose poses were sampled from clips. Those that only instances culled on the GPU need
   /// are counted in every frame in which they may be.
   std::uint32_t sampledFigures = 0;
-  /// A pose counts once for each form that methods need. Poses of figures count as these do.
+  /// A pose counts once for each palette that methods need of it. Poses of figures count, too.
   std::uint32_t convertedPoses = 0;
   std::uint32_t culledCandidates = 0;  ///< instances that the visibility kernel looks at
   std::uint64_t skinnedVertices = 0;
@@ -270,8 +270,8 @@ struct CullingStatistics {
 
 /// What `Scene::statistics` returns.
 struct SceneStatistics {
-  FrameStatistics lastFrame;                  ///< the last `commit`
-  CullingStatistics lastCompletedFrame;       ///< the last `readBack`
+  FrameStatistics lastFrame;                  ///< the last that was executed
+  CullingStatistics lastCompletedFrame;       ///< the last that was read back
   StoreStatistics meshes, palettes, outputs;  ///< memory now
 };
 
@@ -342,8 +342,7 @@ class DERMIS_CORE_API Scene {
   Result<void> removeFigure(FigureHandle figure);
   /// The pose of a figure for a skin of its bank. It has the promise `JointPromise::rigid` if the
   /// clips cannot scale the joints of the skin and its rig, if any, `isRigid`; otherwise `scaling`.
-  /// Fails with `invalidArgument`
-  /// if there is no such skin.
+  /// Fails with `invalidArgument` if there is no such skin.
   Result<PoseHandle> pose(FigureHandle figure, std::uint32_t skin = 0) const;
 
   /// Adds an instance. The next frame skins it. Fails with `invalidArgument` if the description
@@ -369,9 +368,9 @@ class DERMIS_CORE_API Scene {
   /// Begins a frame. `completedFrame` is the newest frame that the GPU has completed, or 0. Frames
   /// are numbered from 1; numbers may be skipped. Reads the results of complete frames, for
   /// `bounds` and `statistics`. On the CPU, each frame is complete when the next one begins: its
-  /// jobs must be done, and `completedFrame` is only checked. Fails with `invalidArgument` if
-  /// `frame` is not larger than the last one, if `completedFrame` is lower than before or not lower
-  /// than `frame`, or if more than `framesInFlight` frames would be in flight.
+  /// jobs must be done, and `completedFrame` is ignored. Fails with `invalidArgument` if `frame` is
+  /// not larger than the last one, if `completedFrame` is lower than before or not lower than
+  /// `frame`, or if more than `framesInFlight` frames would be in flight.
   Result<void> beginFrame(std::uint64_t frame, std::uint64_t completedFrame);
   /// The number of the frame that was begun last; 0 before the first.
   std::uint64_t frame() const;
@@ -386,8 +385,8 @@ class DERMIS_CORE_API Scene {
   /// the same pose, and the engine writes both.
   Result<std::span<float>> writePoseWeights(PoseHandle pose);
   /// States that a GPU pass of the engine writes these poses before the commands of this frame. All
-  /// their instances are skinned again. There is one copy of such a pose: an instance that is
-  /// skinned later uses what the memory holds then. If the frame is abandoned, the engine writes
+  /// their instances are skinned again. The scene keeps no copy: an instance that is skinned in a
+  /// later frame uses what the memory holds then. If the frame is abandoned, the engine writes
   /// and marks the poses again. Fails as `writePose` does, and for a pose that the CPU writes; the
   /// poses before it in `poses` are then marked.
   Result<void> markWritten(std::span<const PoseHandle> poses);
@@ -509,9 +508,9 @@ class DERMIS_CORE_API Scene {
 /// A buffer that a scene asks for.
 struct SceneBuffer {
   std::uint32_t number = 0;  ///< by which commands name it; no other buffer of the scene gets it
-  BufferRole role = BufferRole::positions;
+  BufferRole role = BufferRole::output;
   /// Its usage includes what the scene copies; the engine adds its own, for example VERTEX_BUFFER
-  /// for `positions`, the output of all attributes.
+  /// for `output`.
   BufferRequirement requirement;
   /// Whether the scene writes it (`poses`) or reads it (`readBack`) through a mapping, if it gets
   /// one. The memory is then host-coherent, and for `readBack` host-cached if possible.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <optional>
 
 #include "convert.h"
 
@@ -215,6 +216,10 @@ dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info
     result.joint_counts = known.jointCounts.data();
     result.clips = known.infos.data();
     result.worst_error = known.report.worstError;
+    result.max_error = known.report.maxError;
+    result.slowest_rate = known.report.slowestRate;
+    result.fastest_rate = known.report.fastestRate;
+    result.key_count = known.report.keyCount;
     result.worst = known.report.worst.c_str();
     result.has_root_motion = known.clips.hasRootMotion() ? 1 : 0;
     result.morphed_node_count = static_cast<std::uint32_t>(known.morphedNodes.size());
@@ -339,19 +344,30 @@ dermis_code dermis_play_clips(dermis_scene* scene, const dermis_play* plays, uin
     const std::span<const dermis_play> all = array(plays, count, "plays");
     std::vector<ClipLayer> layers;
     std::vector<FigurePlay> converted;
-    for (const dermis_play& play : all) {
+    std::optional<Failure> failure;  // of the entry behind those that are converted
+    for (std::size_t i = 0; i < all.size() && !failure; ++i) {
       try {
-        converted.push_back({handleOf(play.figure), {}});
-        appendLayers(array(play.layers, play.layer_count, "layers"), layers);
-      } catch (Failure& failure) {
-        failure.message.insert(0, "entry " + std::to_string(&play - all.data()) + ": ");
-        throw;
+        const FigureHandle figure = handleOf(all[i].figure);
+        appendLayers(array(all[i].layers, all[i].layer_count, "layers"), layers);
+        converted.push_back({figure, {}});
+      } catch (Failure& caught) {
+        caught.message.insert(0, "entry " + std::to_string(i) + ": ");
+        failure = std::move(caught);
       }
     }
     std::size_t first = 0;
-    for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t i = 0; i < converted.size(); ++i) {
       converted[i].layers = std::span(layers).subspan(first, all[i].layer_count);
       first += all[i].layer_count;
+    }
+    if (failure) {
+      // An entry without a figure: the scene plays none, and names an entry before it that is
+      // wrong.
+      const std::string own = "entry " + std::to_string(converted.size()) + ": ";
+      converted.emplace_back();
+      const Result<void> played = target.play(converted);
+      if (played || played.error().message.starts_with(own)) throw *std::move(failure);
+      must(played);
     }
     must(target.play(converted));
   });

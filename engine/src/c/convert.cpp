@@ -307,8 +307,7 @@ void CommandList::fill(std::span<const Command> from) {
       to.pipeline = static_cast<std::uint64_t>(dispatch->pipeline);
       to.group_count_x = dispatch->groupCountX;
       to.group_count_y = dispatch->groupCountY;
-      to.is_indirect = dispatch->indirectOffset ? 1 : 0;
-      to.indirect_offset = dispatch->indirectOffset.value_or(0);
+      to.indirect = partOf(dispatch->indirect);
       static_assert(std::extent_v<decltype(to.constants)> ==
                     std::tuple_size_v<decltype(dispatch->constants)>);
       std::copy(dispatch->constants.begin(), dispatch->constants.end(), to.constants);

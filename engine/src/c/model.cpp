@@ -153,7 +153,7 @@ dermis_code dermis_model_pose(const dermis_model* model, uint32_t primitive, uin
     const dermis_model& source = required(model, "model");
     const gltf::SkinnedPrimitive& skinned = primitiveOf(source, primitive);
     if (clip == DERMIS_REST_POSE) {
-      clip = gltf::none;
+      clip = noIndex;
     } else if (clip >= source.clips.size()) {
       fail("the model has no clip " + std::to_string(clip));
     }

@@ -57,7 +57,7 @@ dermis_code dermis_run_job(const dermis_runner* runner, uint32_t index, dermis_e
     if (index >= lender.jobs.size()) fail("the frame has no job " + std::to_string(index));
     if (lender.changes != lender.scene.changes)
       fail("a function of the scene was called since the jobs were listed");
-    cpu::skin(lender.jobs[index]);
+    cpu::run(lender.jobs[index]);
   });
 }
 

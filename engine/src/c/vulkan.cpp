@@ -214,7 +214,7 @@ dermis_code dermis_record_barrier(const dermis_context* context, VkCommandBuffer
   return guarded(error, [&] {
     const vulkan::Context& recording = contextOf(context);
     required(command_buffer, "command_buffer");
-    recording.recordBarrier(command_buffer, vulkan::barrierBetween(useOf(before), useOf(after)));
+    recording.recordBarrier(command_buffer, useOf(before), useOf(after));
   });
 }
 

@@ -48,8 +48,8 @@ std::vector<float> copyFiniteDisplacements(const MorphTargetView& target) {
 
 AttributeView viewOf(const std::vector<float>& values, std::uint32_t components) {
   if (values.empty()) return {};
-  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
-                        components);
+  return attributeView(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                       components);
 }
 
 float clampedShare(float share) {
@@ -144,7 +144,7 @@ Result<RepairedMesh> repair(const MeshView& mesh, std::uint32_t jointCount) {
 
   InfluenceSet& set = repaired.set;
   set.joints = {repaired.joints.data(), mesh.vertexCount, slots * 4, ComponentType::uint32, slots};
-  set.weights = floatAttribute(repaired.weights.data(), mesh.vertexCount, slots);
+  set.weights = attributeView(repaired.weights.data(), mesh.vertexCount, slots);
 
   MeshView& view = repaired.view;
   view.name = repaired.name;

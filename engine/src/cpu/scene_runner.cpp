@@ -24,7 +24,7 @@ namespace dermis::cpu {
 
 struct PlannedTask : Task {};
 
-void skin(const PlannedJob& job) {
+void run(const PlannedJob& job) {
   skinTask(*job.task_);
 }
 

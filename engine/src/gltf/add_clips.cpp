@@ -19,7 +19,7 @@ namespace {
 struct NamedNode {
   std::string_view name;
   bool isNoJoint = false;
-  std::uint32_t node = none;
+  std::uint32_t node = noIndex;
 
   friend auto operator<=>(const NamedNode&, const NamedNode&) = default;
 };
@@ -33,7 +33,7 @@ std::vector<bool> findJoints(const Model& model) {
 
 std::uint32_t targetsOf(const Model& model, std::uint32_t node) {
   const std::uint32_t mesh = model.nodes[node].mesh;
-  return mesh == none ? 0 : model.meshes[mesh].morphTargetCount;
+  return mesh == noIndex ? 0 : model.meshes[mesh].morphTargetCount;
 }
 
 // The distance of a node from its parent.
@@ -89,10 +89,10 @@ class ClipMatcher {
     for (Channel& channel : channels) {
       const auto node = channel.path == ChannelPath::weights ? nodeForWeights(channel)
                                                              : nodeForTransform(channel.node);
-      if (node != none && channel.path == ChannelPath::translation) scale(channel);
+      if (node != noIndex && channel.path == ChannelPath::translation) scale(channel);
       channel.node = node;
     }
-    std::erase_if(channels, [](const Channel& channel) { return channel.node == none; });
+    std::erase_if(channels, [](const Channel& channel) { return channel.node == noIndex; });
     std::ranges::stable_sort(channels, {}, targetOf);
     const auto isRepeated = [](const Channel& a, const Channel& b) {
       return targetOf(a) == targetOf(b);
@@ -127,23 +127,23 @@ class ClipMatcher {
     if (known) return *known;
     known = findNode(channel.node, nodesWithTargets_,
                      "no node of the model with this name has morph targets");
-    if (*known == none || targetsOf(model_, *known) == channel.components) return *known;
+    if (*known == noIndex || targetsOf(model_, *known) == channel.components) return *known;
     notes_.remark(NoteKind::otherTargets, place(from_, channel.node), ": its mesh has ",
                   channel.components, " morph targets, that of the model has ",
                   targetsOf(model_, *known), "; its weights are left out");
-    return *(known = none);
+    return *(known = noIndex);
   }
 
   std::uint32_t findNode(std::uint32_t node, const Names& names, const char* complaint) const {
     const std::string& name = from_.nodes[node].name;
     if (name.empty()) {
       notes_.remark(NoteKind::unmatched, "node ", node, " is animated, but has no name");
-      return none;
+      return noIndex;
     }
     const auto found = find(names, name);
     if (found == names.end()) {
       notes_.remark(NoteKind::unmatched, place(from_, node), " is animated, but ", complaint);
-      return none;
+      return noIndex;
     }
     const auto next = std::next(found);
     if (next != names.end() && next->name == name && next->isNoJoint == found->isNoJoint) {

@@ -8,7 +8,7 @@ namespace {
 SkeletonNode skeletonNode(const Model& model, const Node& node) {
   SkeletonNode result{node.name, node.parent, node.translation, node.rotation, node.scale};
   if (node.matrix) result.matrix = localTransform(node);
-  if (node.mesh != none) {
+  if (node.mesh != noIndex) {
     result.weights =
         node.morphWeights.empty() ? model.meshes[node.mesh].morphWeights : node.morphWeights;
   }

@@ -14,12 +14,12 @@ class Descendants {
   explicit Descendants(const Model& model) : first_(model.nodes.size()), end_(first_) {
     std::vector<std::uint32_t> size(first_.size(), 1);
     for (auto node = model.nodeOrder.rbegin(); node != model.nodeOrder.rend(); ++node)
-      if (model.nodes[*node].parent != none) size[model.nodes[*node].parent] += size[*node];
+      if (model.nodes[*node].parent != noIndex) size[model.nodes[*node].parent] += size[*node];
     std::uint32_t nextRoot = 0;
     std::vector<std::uint32_t> nextChild(first_.size());
     for (const std::uint32_t node : model.nodeOrder) {
       const std::uint32_t parent = model.nodes[node].parent;
-      std::uint32_t& next = parent == none ? nextRoot : nextChild[parent];
+      std::uint32_t& next = parent == noIndex ? nextRoot : nextChild[parent];
       first_[node] = next;
       nextChild[node] = next + 1;
       end_[node] = next += size[node];

@@ -136,7 +136,7 @@ class PrimitiveDecoder {
       if (!isNew) ++known;
     };
     for (const auto& [index, id] : ids) isKnown(index, id);
-    isKnown(indices, none);
+    isKnown(indices, noIndex);
     return known == ids.size() + 1;
   }
 

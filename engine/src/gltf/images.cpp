@@ -53,7 +53,7 @@ TextureUse textureOf(const json& root, const json& material) {
   if (!image || *image >= member(root, "images").size()) return use;
   use.image = static_cast<std::uint32_t>(*image);
   use.texcoord = static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(wholeNumber(member(info, "texCoord")).value_or(0), none));
+      std::min<std::uint64_t>(wholeNumber(member(info, "texCoord")).value_or(0), noIndex));
   if (const auto sampler = wholeNumber(member(texture, "sampler"))) {
     const json& from = element(member(root, "samplers"), *sampler);
     use.wrapU = wrapOf(member(from, "wrapS"));
@@ -74,7 +74,7 @@ class ImageReader {
 
   /// The first image that equals this one, or `none` if it cannot be read.
   std::uint32_t find(std::uint32_t index) {
-    if (index >= same_.size()) return none;
+    if (index >= same_.size()) return noIndex;
     if (!same_[index]) same_[index] = read(index);
     return *same_[index];
   }
@@ -92,7 +92,7 @@ class ImageReader {
     } catch (const Failure& failure) {
       source_.notes().remark(NoteKind::image, failure.error.message, "; it is left out");
     }
-    if (image.bytes.empty()) return none;
+    if (image.bytes.empty()) return noIndex;
     const std::string_view content(reinterpret_cast<const char*>(image.bytes.data()),
                                    image.bytes.size());
     const auto [place, isNew] = byContent_.emplace(content, index);
@@ -158,7 +158,7 @@ void readImages(const Appearance& appearance, const Source& source, SideFiles& f
   for (std::size_t i = 0; i < model.materials.size(); ++i) {
     TextureUse use = appearance.baseColorTextures[i];
     use.image = images.find(use.image);
-    if (use.image != none) model.materials[i].baseColorTexture = use;
+    if (use.image != noIndex) model.materials[i].baseColorTexture = use;
   }
 }
 

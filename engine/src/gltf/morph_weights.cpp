@@ -22,7 +22,7 @@ const Channel* findWeights(const Model& model, std::uint32_t node, std::uint32_t
 
 std::vector<float> morphWeights(const Model& model, std::uint32_t node, std::uint32_t clip,
                                 double time) {
-  if (node >= model.nodes.size() || model.nodes[node].mesh == none) return {};
+  if (node >= model.nodes.size() || model.nodes[node].mesh == noIndex) return {};
   const Node& from = model.nodes[node];
   const Mesh& mesh = model.meshes[from.mesh];
   std::vector<float> weights(mesh.morphTargetCount, 0.0f);

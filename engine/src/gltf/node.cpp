@@ -79,7 +79,7 @@ void readParents(const tinygltf::Model& content, Model& model) {
   for (std::size_t parent = 0; parent < content.nodes.size(); ++parent) {
     for (const int childIndex : content.nodes[parent].children) {
       Node& child = model.nodes[static_cast<std::size_t>(childIndex)];
-      if (child.parent != none) {
+      if (child.parent != noIndex) {
         failInvalid("node ", childIndex, ": it is a child of both node ", child.parent,
                     " and node ", parent);
       }
@@ -94,7 +94,7 @@ std::vector<bool> findUsed(const Source& source, const Model& model) {
   const tinygltf::Model& content = source.content();
   std::vector<bool> used(model.nodes.size(), false);
   for (std::size_t i = 0; i < used.size(); ++i)
-    used[i] = model.nodes[i].mesh != none && model.nodes[i].skin != none;
+    used[i] = model.nodes[i].mesh != noIndex && model.nodes[i].skin != noIndex;
   const auto use = [&](const std::vector<int>& nodes) {
     for (const int node : nodes) used[static_cast<std::size_t>(node)] = true;
   };
@@ -111,7 +111,7 @@ void orderNodes(const Source& source, Model& model) {
   const tinygltf::Model& content = source.content();
   model.nodeOrder.reserve(model.nodes.size());
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
-    if (model.nodes[i].parent == none) model.nodeOrder.push_back(i);
+    if (model.nodes[i].parent == noIndex) model.nodeOrder.push_back(i);
   }
   for (std::size_t i = 0; i < model.nodeOrder.size(); ++i) {
     for (const int child : content.nodes[model.nodeOrder[i]].children) {
@@ -126,7 +126,7 @@ void orderNodes(const Source& source, Model& model) {
     if (reached[i]) continue;
     source.notes().tolerateUnlessUsed(
         used[i], [&] { failInvalid("node ", i, ": it is part of, or below, a cycle of nodes"); });
-    model.nodes[i].parent = none;
+    model.nodes[i].parent = noIndex;
     model.nodeOrder.push_back(i);
   }
 }

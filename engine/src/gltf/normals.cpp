@@ -18,7 +18,7 @@ using Indices = std::vector<std::uint32_t>;
 MeshView positionsOf(const Primitive& primitive) {
   MeshView view;
   view.vertexCount = primitive.vertexCount;
-  view.positions = floatAttribute(primitive.positions.data(), primitive.vertexCount, 3);
+  view.positions = attributeView(primitive.positions.data(), primitive.vertexCount, 3);
   return view;
 }
 

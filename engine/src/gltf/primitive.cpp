@@ -51,18 +51,18 @@ constexpr Format clearIndices[] = {unorm8, unorm16};
 // The number in "JOINTS_3" if the name begins with the prefix "JOINTS_".
 struct SetName {
   bool matches = false;
-  std::uint32_t number = none;  // none if not written as the specification requires
+  std::uint32_t number = noIndex;  // none if not written as the specification requires
 };
 
 SetName setName(std::string_view name, std::string_view prefix) {
   if (!name.starts_with(prefix)) return {};
   const std::string_view digits = name.substr(prefix.size());
-  std::uint32_t number = none;
+  std::uint32_t number = noIndex;
   const char* const end = digits.data() + digits.size();
   const auto [stop, error] = std::from_chars(digits.data(), end, number);
   const bool isDecimal = error == std::errc() && stop == end && digits.size() <= 6 &&
                          (digits.size() == 1 || digits[0] != '0');
-  return {true, isDecimal ? number : none};
+  return {true, isDecimal ? number : noIndex};
 }
 
 int findAttribute(const std::map<std::string, int>& attributes, const std::string& name) {
@@ -78,7 +78,7 @@ std::uint32_t countSets(const std::map<std::string, int>& attributes, std::strin
     const SetName set = setName(name, prefix);
     if (!set.matches) continue;
     ++count;
-    if (set.number == none) failInvalid(where, ": there is no attribute ", inQuotes(name));
+    if (set.number == noIndex) failInvalid(where, ": there is no attribute ", inQuotes(name));
   }
   for (std::uint32_t i = 0; i < count; ++i) {
     if (attributes.contains(join(prefix, i))) continue;

@@ -7,8 +7,8 @@ namespace {
 
 AttributeView optionalFloats(const std::vector<float>& values, std::uint32_t components) {
   if (values.empty()) return {};
-  return floatAttribute(values.data(), static_cast<std::uint32_t>(values.size() / components),
-                        components);
+  return attributeView(values.data(), static_cast<std::uint32_t>(values.size() / components),
+                       components);
 }
 
 AttributeView influenceView(const std::vector<std::byte>& bytes, std::uint32_t vertexCount,

@@ -18,7 +18,7 @@ namespace dermis::gltf {
 
 /// An index from tinygltf; its −1 becomes `none`.
 inline std::uint32_t indexOf(int index) {
-  return index < 0 ? none : static_cast<std::uint32_t>(index);
+  return index < 0 ? noIndex : static_cast<std::uint32_t>(index);
 }
 
 /// Reads nodes and nodeOrder: names, transforms, parents. Refuses cycles and nodes with two

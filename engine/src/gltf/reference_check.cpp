@@ -494,7 +494,7 @@ class ReferenceCheck {
     for (auto entry = attributes.begin(); entry != attributes.end(); ++entry) {
       const std::uint64_t id =
           integer(entry.value(), join(where, ": the id of ", inQuotes(entry.key())));
-      if (id >= none) failInvalid(where, ": there is no attribute ", id);
+      if (id >= noIndex) failInvalid(where, ": there is no attribute ", id);
       compressed.attributes.emplace(entry.key(), static_cast<std::uint32_t>(id));
     }
   }

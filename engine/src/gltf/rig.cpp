@@ -73,16 +73,16 @@ std::string readName(json& value, const std::string& what) {
 }
 
 std::uint32_t numberFrom(const std::string& name) {
-  std::uint32_t number = none;
+  std::uint32_t number = noIndex;
   const char* const end = name.data() + name.size();
   const auto [stop, error] = std::from_chars(name.data(), end, number);
-  return error == std::errc() && stop == end ? number : none;
+  return error == std::errc() && stop == end ? number : noIndex;
 }
 
 /// How the text names a morph target.
 struct TargetName {
   std::string name;
-  std::uint32_t number = none;  ///< the name as a number
+  std::uint32_t number = noIndex;  ///< the name as a number
 };
 
 /// "mesh 'arm'"; without a name "mesh 2".
@@ -100,7 +100,7 @@ class TargetFinder {
     const std::vector<std::string>& names = model.meshes[index].morphTargetNames;
     for (std::uint32_t i = 0; i < std::min<std::size_t>(names.size(), count_); ++i) {
       const auto [known, isNew] = byName_.emplace(names[i], i);
-      if (!isNew) known->second = none;
+      if (!isNew) known->second = noIndex;
     }
   }
 
@@ -108,8 +108,8 @@ class TargetFinder {
   /// several have the name.
   std::uint32_t find(const TargetName& target) const {
     const auto found = target.name.empty() ? byName_.end() : byName_.find(target.name);
-    if (found == byName_.end()) return target.number < count_ ? target.number : none;
-    if (found->second == none)
+    if (found == byName_.end()) return target.number < count_ ? target.number : noIndex;
+    if (found->second == noIndex)
       failInvalid("several morph targets of ", titleOf(model_, index_), " are called ",
                   inQuotes(target.name), "; write the number of one");
     return found->second;
@@ -151,7 +151,7 @@ class RigReader {
     spend(budget_, model_.nodes.size(), 4 * sizeof(std::uint32_t), "the joints of a rig");
     for (std::uint32_t i = 0; i < skin_.joints.size(); ++i) {
       const auto [known, isNew] = names_.emplace(model_.nodes[skin_.joints[i]].name, i);
-      if (!isNew) known->second = none;
+      if (!isNew) known->second = noIndex;
     }
   }
 
@@ -183,7 +183,7 @@ class RigReader {
   std::uint32_t jointOf(json& value, const std::string& what) const {
     const std::string name = readName(value, what);
     const auto found = names_.find(name);
-    if (found != names_.end() && found->second == none && !name.empty())
+    if (found != names_.end() && found->second == noIndex && !name.empty())
       failInvalid(what, ": several joints of the skin are called ", inQuotes(name),
                   "; write the number of one");
     const std::uint32_t joint =
@@ -394,14 +394,14 @@ class RigReader {
       rig_.places.push_back(drivenJoints_.contains(joint) ? driven++ : written++);
 
     // The nearest joint above each node.
-    std::vector<std::uint32_t> jointOfNode(model_.nodes.size(), none);
+    std::vector<std::uint32_t> jointOfNode(model_.nodes.size(), noIndex);
     for (std::uint32_t joint = 0; joint < count; ++joint)
       jointOfNode[skin_.joints[joint]] = rig_.places[joint];
-    std::vector<std::uint32_t> above(model_.nodes.size(), none);
+    std::vector<std::uint32_t> above(model_.nodes.size(), noIndex);
     for (const std::uint32_t node : model_.nodeOrder) {
       const std::uint32_t parent = model_.nodes[node].parent;
-      if (parent != none)
-        above[node] = jointOfNode[parent] != none ? jointOfNode[parent] : above[parent];
+      if (parent != noIndex)
+        above[node] = jointOfNode[parent] != noIndex ? jointOfNode[parent] : above[parent];
     }
     rig_.joints.resize(count + ofChains_);
     for (std::uint32_t joint = 0; joint < count; ++joint)
@@ -428,7 +428,7 @@ class RigReader {
     std::map<std::uint32_t, std::vector<std::uint32_t>> below;  // by driven joint
     for (std::uint32_t joint = 0; joint < skin_.joints.size(); ++joint) {
       if (const std::uint32_t parent = above[skin_.joints[joint]];
-          parent != none && !drivenJoints_.contains(joint))
+          parent != noIndex && !drivenJoints_.contains(joint))
         below[parent].push_back(joint);
     }
     for (const auto& [joint, driver] : drivenJoints_) {
@@ -447,7 +447,7 @@ class RigReader {
   void checkDriven(std::uint32_t mesh, const std::vector<std::uint32_t>& targets) const {
     std::map<std::uint32_t, std::size_t> known;
     for (std::size_t i = 0; i < targets.size(); ++i) {
-      if (targets[i] == none) continue;
+      if (targets[i] == noIndex) continue;
       const auto [other, isNew] = known.emplace(targets[i], i);
       if (!isNew)
         failInvalid("driver ", drivenWeights_.at(driven_[i].name).second, ": the weights ",
@@ -479,19 +479,19 @@ class RigReader {
       checkDriven(node.mesh, targets);
       bool hasSome = false;
       for (std::size_t weight = 0; weight < targets.size(); ++weight) {
-        if (targets[weight] == none) continue;
+        if (targets[weight] == noIndex) continue;
         isTarget[weight] = true;
         hasSome = true;
       }
       if (hasSome) rig_.targets.emplace(node.mesh, std::move(targets));
-      if (rig_.view.weightsOf != none || given.empty()) continue;
+      if (rig_.view.weightsOf != noIndex || given.empty()) continue;
       givenTargets.clear();
       const bool hasAll = std::ranges::all_of(givenNames, [&](const TargetName& name) {
-        return givenTargets.emplace_back(known.find(name)) != none;
+        return givenTargets.emplace_back(known.find(name)) != noIndex;
       });
       if (hasAll) rig_.view.weightsOf = i;
     }
-    if (!given.empty() && rig_.view.weightsOf == none)
+    if (!given.empty() && rig_.view.weightsOf == noIndex)
       failInvalid("the rig: no mesh of the skin has the morph target ", inQuotes(*given.begin()),
                   given.size() == 1 ? "" : " and the others that linear drivers read");
     for (const auto& [name, driven] : drivenWeights_) {
@@ -501,7 +501,7 @@ class RigReader {
     }
     // Given ones are all targets of the mesh that no driver drives.
     std::map<std::string, std::uint32_t> givenNumbers;
-    if (rig_.view.weightsOf != none) {
+    if (rig_.view.weightsOf != noIndex) {
       const std::uint32_t index = model_.nodes[rig_.view.weightsOf].mesh;
       std::set<std::uint32_t> driven;
       if (const auto found = rig_.targets.find(index); found != rig_.targets.end())
@@ -541,7 +541,7 @@ class RigReader {
         const std::size_t end =
             std::min(message.find_first_not_of("0123456789", begin), message.size());
         const std::uint32_t number = numberFrom(message.substr(begin, end - begin));
-        const std::string text = number == none ? std::string() : other(number);
+        const std::string text = number == noIndex ? std::string() : other(number);
         if (!text.empty()) message.replace(at, end - at, text);
         at += std::max<std::size_t>(text.size(), 1);
       }

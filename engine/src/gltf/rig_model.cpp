@@ -46,9 +46,9 @@ class RigApplier {
   void run() {
     std::map<std::uint32_t, bool> isShared;  // by mesh of the skin: with nodes of other skins
     for (const Node& node : model_.nodes)
-      if (node.mesh != none && node.skin == skin_) isShared[node.mesh] = false;
+      if (node.mesh != noIndex && node.skin == skin_) isShared[node.mesh] = false;
     for (const Node& node : model_.nodes) {
-      const auto found = node.mesh == none ? isShared.end() : isShared.find(node.mesh);
+      const auto found = node.mesh == noIndex ? isShared.end() : isShared.find(node.mesh);
       if (found != isShared.end() && node.skin != skin_) found->second = true;
     }
     std::vector<Mesh> meshes;
@@ -78,7 +78,7 @@ class RigApplier {
       std::erase_if(clip.channels, [](const Channel& channel) { return channel.components == 0; });
     }
     for (Node& node : model_.nodes) {
-      if (node.mesh == none || node.skin != skin_) continue;
+      if (node.mesh == noIndex || node.skin != skin_) continue;
       if (const auto targets = given.find(node.mesh); targets != given.end())
         select(node.morphWeights, model_.meshes[node.mesh].morphTargetCount, targets->second);
       node.mesh = moved[node.mesh];
@@ -145,11 +145,30 @@ class RigApplier {
     }
     for (Primitive& primitive : mesh.primitives) {
       if (primitive.influences.empty()) continue;
+      checkJoints(index, primitive);
       if (rig_.joints.size() != rig_.view.writtenJoints)
         for (Influences& set : primitive.influences) renumber(set);
       bind(primitive);
     }
     return mesh;
+  }
+
+  /// Joints beyond those of the skin are mostly the driven ones of a rig that was applied before.
+  void checkJoints(std::uint32_t mesh, const Primitive& primitive) {
+    const std::size_t count = rig_.places.size();
+    const PrimitiveView view(primitive);
+    for (const InfluenceSet& set : view.mesh().influenceSets) {
+      if (!checked_.emplace(set.joints.data, set.weights.data).second) continue;
+      for (std::uint32_t vertex = 0; vertex < primitive.vertexCount; ++vertex) {
+        for (std::uint32_t slot = 0; slot < set.weights.components; ++slot) {
+          const std::uint32_t joint = loadJoint(set.joints, vertex, slot);
+          if (joint < count || loadFloat(set.weights, vertex, slot) == 0) continue;
+          failInvalid("skin ", skin_, " has ", counted(count, "joint"), ", but vertex ", vertex,
+                      " of mesh ", mesh, " follows joint ", joint,
+                      ": the file is wrong, or a rig was applied to the skin before");
+        }
+      }
+    }
   }
 
   /// An element that does not exist is empty.
@@ -280,9 +299,9 @@ class RigApplier {
     MeshView mesh;
     mesh.name = primitive.name;
     mesh.vertexCount = count;
-    mesh.positions = floatAttribute(positions.data(), count, 3);
+    mesh.positions = attributeView(positions.data(), count, 3);
     const InfluenceSet set{{ofSlots.data(), count, slots * 4, ComponentType::uint32, slots},
-                           floatAttribute(weights.data(), count, slots)};
+                           attributeView(weights.data(), count, slots)};
     mesh.influenceSets = {&set, 1};
     const Result<RepairedMesh> bent = bendChain(mesh, rig_.joints, chain);
     if (!bent) throw Failure{bent.error()};
@@ -301,6 +320,7 @@ class RigApplier {
   std::uint32_t skin_;
   const OwnedRig& rig_;
   MemoryBudget& budget_;
+  std::set<std::pair<const void*, const void*>> checked_;     ///< arrays of joints and weights
   std::map<const void*, SharedArray<std::byte>> renumbered_;  ///< by array of joints
   std::vector<SharedArray<std::byte>> kept_;
   std::map<std::vector<const void*>, std::vector<Influences>> bound_;

@@ -65,7 +65,7 @@ std::vector<Transform> nodeGlobals(const Model& model, std::uint32_t clip, doubl
   for (const std::uint32_t index : model.nodeOrder) {
     const Node& node = model.nodes[index];
     const Transform local = node.matrix ? localTransform(node) : compose(locals[index]);
-    globals[index] = node.parent == none ? local : multiply(globals[node.parent], local);
+    globals[index] = node.parent == noIndex ? local : multiply(globals[node.parent], local);
   }
   return globals;
 }

@@ -12,7 +12,7 @@ std::vector<bool> nodesBelow(const Model& model, const std::vector<std::uint32_t
   for (const std::uint32_t root : roots) reachable[root] = true;
   for (const std::uint32_t node : model.nodeOrder) {
     const std::uint32_t parent = model.nodes[node].parent;
-    if (parent != none && reachable[parent]) reachable[node] = true;
+    if (parent != noIndex && reachable[parent]) reachable[node] = true;
   }
   return reachable;
 }
@@ -22,7 +22,7 @@ std::vector<bool> nodesBelow(const Model& model, const std::vector<std::uint32_t
 std::vector<bool> nodesOfScene(const Source& source, const Model& model, std::size_t scene) {
   std::vector<std::uint32_t> roots, others;
   for (const int node : source.content().scenes[scene].nodes)
-    (model.nodes[indexOf(node)].parent == none ? roots : others).push_back(indexOf(node));
+    (model.nodes[indexOf(node)].parent == noIndex ? roots : others).push_back(indexOf(node));
   std::vector<bool> reachable = nodesBelow(model, roots);
   for (const std::uint32_t node : others) {
     const std::string sentence = join("scene ", scene, ": node ", node, " is not a root but a ",
@@ -146,7 +146,7 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, const Load
   }
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     Node& node = model.nodes[i];
-    if (node.mesh != none && !node.morphWeights.empty())
+    if (node.mesh != noIndex && !node.morphWeights.empty())
       fillUp(source, "node", i, model.meshes[node.mesh].morphTargetCount, node.morphWeights);
   }
 
@@ -157,10 +157,10 @@ void readScene(Source& source, const std::vector<bool>& faultyMeshes, const Load
   std::vector<std::uint32_t> notSkinned;
   for (std::uint32_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
-    if (node.mesh == none) continue;
+    if (node.mesh == noIndex) continue;
     if (!reachable[i]) ++outside;
-    if (reachable[i] && node.skin == none) notSkinned.push_back(i);
-    if (!reachable[i] || node.skin == none) continue;
+    if (reachable[i] && node.skin == noIndex) notSkinned.push_back(i);
+    if (!reachable[i] || node.skin == noIndex) continue;
     if (!jointsReachable[node.skin]) {
       source.notes().broken(NoteKind::jointOutside, "node ", i, ": its skin, ", node.skin,
                             ", has joints outside the scene");

@@ -54,7 +54,7 @@ std::vector<std::uint32_t> findRoots(const Model& model) {
   std::vector<std::uint32_t> roots(model.nodes.size());
   for (const std::uint32_t node : model.nodeOrder) {
     const std::uint32_t parent = model.nodes[node].parent;
-    roots[node] = parent == none ? node : roots[parent];
+    roots[node] = parent == noIndex ? node : roots[parent];
   }
   return roots;
 }

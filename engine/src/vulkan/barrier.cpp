@@ -108,7 +108,8 @@ Barrier barrierBetween(Use before, Use after, QueueTransfer transfer) {
   return {source.stages, source.writes, destination.stages, destination.reads | destination.writes};
 }
 
-void ContextState::recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const {
+void ContextState::recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const {
+  const Barrier barrier = barrierBetween(before, after);
   constexpr VkPipelineStageFlags top = VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT,
                                  bottom = VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT;
   if ((barrier.sourceStages & ~top) == 0 || (barrier.destinationStages & ~bottom) == 0) return;
@@ -117,8 +118,8 @@ void ContextState::recordBarrier(VkCommandBuffer commandBuffer, const Barrier& b
                            &memory, 0, nullptr, 0, nullptr);
 }
 
-void Context::recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const {
-  state_->recordBarrier(commandBuffer, barrier);
+void Context::recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const {
+  state_->recordBarrier(commandBuffer, before, after);
 }
 
 }  // namespace dermis::vulkan

@@ -203,8 +203,9 @@ Result<void> ContextState::prepare(const PipelineNeeds& needs, const Tuning& wit
   return prepare(*all);
 }
 
-Result<void> Context::prepare(const PipelineNeeds& needs) const {
-  return state_->prepare(needs, state_->tuning);
+Result<void> Context::prepare(const PipelineNeeds& needs,
+                              const std::optional<Tuning>& tuning) const {
+  return state_->prepare(needs, tuning.value_or(state_->tuning));
 }
 
 Result<void> Context::prepare(std::span<const PipelineId> ids) const {

@@ -119,7 +119,7 @@ class Recorder {
         staging_(staging) {}
 
   void operator()(const BarrierCommand& barrier) {
-    context_.recordBarrier(commandBuffer_, barrierBetween(barrier.before, barrier.after));
+    context_.recordBarrier(commandBuffer_, barrier.before, barrier.after);
   }
 
   void operator()(const ClearCommand& clear) {
@@ -151,10 +151,10 @@ class Recorder {
                             dispatch.constantCount * 4, dispatch.constants.data());
     ++recorded_.dispatches;
     recorded_.workgroups += dispatch.workgroupCount;
-    if (dispatch.indirectOffset) {
-      const BufferRange& tables = buffers_[dispatch.bindings.front().part.buffer].range;
-      table_.cmdDispatchIndirect(commandBuffer_, tables.buffer,
-                                 tables.offset + *dispatch.indirectOffset);
+    if (dispatch.indirect.size != 0) {
+      const BufferRange& arguments = buffers_[dispatch.indirect.buffer].range;
+      table_.cmdDispatchIndirect(commandBuffer_, arguments.buffer,
+                                 arguments.offset + dispatch.indirect.offset);
     } else {
       table_.cmdDispatch(commandBuffer_, dispatch.groupCountX, dispatch.groupCountY, 1);
     }

@@ -40,7 +40,7 @@ struct ContextState {
   std::uint32_t texelBindingCount() const {
     return limits.texelBuffers ? abi::TEXEL_BINDING_COUNT : 0;
   }
-  void recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const;
+  void recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const;
   bool pushesDescriptors() const { return table.cmdPushDescriptorSet != nullptr; }
   Result<void> createLayouts();
   Result<void> prepare(std::span<const PipelineId> ids) const;

@@ -71,7 +71,7 @@ Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
   std::vector<std::array<float, 4>> tangents;
   for (const PlainVertex& vertex : vertices)
     tangents.push_back({vertex.normal[1], vertex.normal[2], vertex.normal[0], 1});
-  mesh.tangents = floatAttribute(tangents[0].data(), mesh.vertexCount, 4);
+  mesh.tangents = attributeView(tangents[0].data(), mesh.vertexCount, 4);
   mesh.centersOfRotation = mesh.positions;
   mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);
@@ -130,8 +130,8 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
   if (!packed) return packed.error();
   crowd.mesh.emplace(std::move(*packed));
 
-  const std::uint32_t clip = model->clips.empty() ? gltf::none : 0;
-  const double duration = clip == gltf::none ? 0 : model->clips[clip].duration;
+  const std::uint32_t clip = model->clips.empty() ? noIndex : 0;
+  const double duration = clip == noIndex ? 0 : model->clips[clip].duration;
   // Multiples of the golden ratio are evenly distributed: no two instances are in step.
   const double step = (std::sqrt(5.0) - 1) / 2;
   for (std::uint32_t instance = 0; instance < instanceCount; ++instance) {

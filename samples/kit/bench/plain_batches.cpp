@@ -108,8 +108,7 @@ Result<void> PlainBatches::recordPalettes(const Crowd& crowd, VkCommandBuffer co
   const std::uint32_t jointTotal = crowd.instanceCount() * crowd.jointCount();
   kernels_.push(commandBuffer, {&jointTotal, 1});
   device_.functions().CmdDispatch(commandBuffer, groupsOf(jointTotal), 1, 1);
-  recordBarrier(device_, commandBuffer,
-                vulkan::barrierBetween(Use::computeWrite, Use::computeRead));
+  recordBarrier(device_, commandBuffer, Use::computeWrite, Use::computeRead);
   return {};
 }
 
@@ -151,8 +150,7 @@ Result<void> PlainBatches::record(const Crowd& crowd, PlainKernel kernel) {
       !begun)
     return begun;
   // After the previous execution.
-  recordBarrier(device_, commandBuffer,
-                vulkan::barrierBetween(Use::computeWrite, Use::computeWrite | Use::computeRead));
+  recordBarrier(device_, commandBuffer, Use::computeWrite, Use::computeWrite | Use::computeRead);
   timestamps_.recordBegin(commandBuffer);
   if (kernel == PlainKernel::dualQuaternion) {
     if (Result<void> recorded = recordPalettes(crowd, commandBuffer); !recorded) return recorded;

@@ -35,7 +35,7 @@ render::Wrap wrapOf(gltf::Wrap wrap) {
 Surface untexturedSurface(const gltf::Model& model, const gltf::Primitive& primitive) {
   // Without a material the surface is not metallic. glTF's default, fully metallic, looks dark.
   Surface surface;
-  if (primitive.material == gltf::none) return surface;
+  if (primitive.material == noIndex) return surface;
   const gltf::Material& material = model.materials[primitive.material];
   surface.baseColor = material.baseColor;
   surface.metallic = std::clamp(material.metallic, 0.f, 1.f);
@@ -49,7 +49,7 @@ Surface untexturedSurface(const gltf::Model& model, const gltf::Primitive& primi
 }  // namespace
 
 gltf::TextureUse Appearances::textureUse(const gltf::Primitive& primitive) const {
-  if (primitive.material == gltf::none) return {};
+  if (primitive.material == noIndex) return {};
   return model_->materials[primitive.material].baseColorTexture;
 }
 
@@ -65,7 +65,7 @@ Result<std::uint32_t> Appearances::decode(std::uint32_t index,
 }
 
 Result<std::uint32_t> Appearances::texture(const gltf::TextureUse& use) {
-  if (use.image == gltf::none) return 0u;
+  if (use.image == noIndex) return 0u;
   const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
   if (!isNew) return place->second;
   const render::TextureOptions options{wrapOf(use.wrapU), wrapOf(use.wrapV)};

@@ -4,7 +4,7 @@
 //   Renderer renderer = *Renderer::create(device);
 //   RenderFrame frame = *renderer.createFrame({1280, 720});
 //   context.record(commandBuffer, …);                          // or SceneRecorder::record
-//   context.recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput));
+//   context.recordBarrier(commandBuffer, Use::dermis, Use::vertexInput);
 //   renderer.record(commandBuffer, frame, views);
 //   frame.target().recordReadBack(…), or a blit from frame.target().resolved() into a window
 #pragma once

@@ -212,7 +212,7 @@ void RenderTarget::recordReadBack(const Device& device, VkCommandBuffer commandB
   device.functions().CmdCopyImageToBuffer(commandBuffer, resolved_.handle(),
                                           VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readBack_.handle(),
                                           1, &copy);
-  recordBarrier(device, commandBuffer, vulkan::barrierBetween(Use::copyWrite, Use::hostRead));
+  recordBarrier(device, commandBuffer, Use::copyWrite, Use::hostRead);
 }
 
 std::vector<std::uint8_t> RenderTarget::pixels() const {

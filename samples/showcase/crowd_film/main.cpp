@@ -107,9 +107,9 @@ class SkinnedCrowd {
       plays.push_back({figure.handle, std::span(layers).subspan(first)});
     }
     must(recorder_.scene().play(plays));
-    context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::vertexInput, Use::dermis));
+    context_->recordBarrier(commandBuffer, Use::vertexInput, Use::dermis);
     must(recorder_.record(commandBuffer));
-    context_->recordBarrier(commandBuffer, vulkan::barrierBetween(Use::dermis, Use::vertexInput));
+    context_->recordBarrier(commandBuffer, Use::dermis, Use::vertexInput);
   }
 
   /// The figures in the picture. Near ones are first, so that hidden ones are not shaded.

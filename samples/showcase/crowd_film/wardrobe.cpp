@@ -78,7 +78,7 @@ glm::vec3 ownColor(const gltf::Primitive& primitive) {
 Wardrobe::Wardrobe(const samples::Character& character) {
   for (const samples::Part& part : character.parts()) {
     std::vector<glm::vec3>& tints = tints_.emplace_back();
-    if (part.source->material == gltf::none) continue;
+    if (part.source->material == noIndex) continue;
     const gltf::Material& material = character.model().materials[part.source->material];
     const auto found = std::ranges::find(allColors(), material.name, &Colors::material);
     if (found == allColors().end()) continue;

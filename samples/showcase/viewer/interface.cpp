@@ -60,7 +60,7 @@ void chooseClip(std::uint32_t clip, State& state) {
 }
 
 void stepClip(std::uint32_t step, const SceneView& view, State& state) {
-  // The rest pose counts as a clip before the first: `gltf::none` + 1 is 0.
+  // The rest pose counts as a clip before the first: `noIndex` + 1 is 0.
   const auto count = static_cast<std::uint32_t>(view.scene().model->clips.size() + 1);
   chooseClip((state.shot.clip + 1 + step) % count - 1, state);
 }
@@ -160,7 +160,7 @@ void drawClip(const SceneView& view, State& state) {
     return own.empty() ? fmt::format("clip {}", index) : samples::shortName(own);
   };
   if (const auto clip = choose("##clip", count + 1, std::min(state.shot.clip, count), name); clip)
-    chooseClip(*clip < count ? *clip : gltf::none, state);
+    chooseClip(*clip < count ? *clip : noIndex, state);
   if (ImGui::Button(state.isPlaying ? "Pause" : "Play", {58, 0}))
     state.isPlaying = !state.isPlaying;
   ImGui::SameLine();
@@ -296,7 +296,7 @@ void drawJoints(const SceneView& view, const Shot& shot, const ImVec2& corner, c
     const std::uint32_t parent = view.joints()[index].parent;
     if (!places[index]) continue;
     const ImU32 color = index == shot.joint ? orange : white;
-    if (parent != gltf::none && places[parent]) {
+    if (parent != noIndex && places[parent]) {
       list.AddLine(*places[parent], *places[index], dark, 4);
       list.AddLine(*places[parent], *places[index], white, 1.5f);
     }

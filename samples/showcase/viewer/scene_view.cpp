@@ -36,21 +36,21 @@ void write(const samples::MappedBuffer& buffer, std::span<const float> values, f
 
 std::vector<Joint> jointsOf(const cli::Scene& scene) {
   const gltf::Model& model = *scene.model;
-  std::vector<std::uint32_t> place(model.nodes.size(), gltf::none);
+  std::vector<std::uint32_t> place(model.nodes.size(), noIndex);
   std::vector<Joint> joints;
   for (const cli::ScenePart& part : scene.parts) {
     for (const std::uint32_t node : model.skins[part.source.skin].joints) {
-      if (place[node] != gltf::none) continue;
+      if (place[node] != noIndex) continue;
       place[node] = static_cast<std::uint32_t>(joints.size());
       std::string name = samples::shortName(model.nodes[node].name);
       if (name.empty()) name = "node " + std::to_string(node);
-      joints.push_back({std::move(name), node, gltf::none});
+      joints.push_back({std::move(name), node, noIndex});
     }
   }
   for (Joint& joint : joints) {
     std::uint32_t above = model.nodes[joint.node].parent;
-    while (above != gltf::none && place[above] == gltf::none) above = model.nodes[above].parent;
-    if (above != gltf::none) joint.parent = place[above];
+    while (above != noIndex && place[above] == noIndex) above = model.nodes[above].parent;
+    if (above != noIndex) joint.parent = place[above];
   }
   return joints;
 }

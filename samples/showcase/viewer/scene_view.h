@@ -23,8 +23,8 @@ enum class Coloring : std::uint8_t { surface, weights, error };
 
 /// Everything that determines a picture: equal shots look the same.
 struct Shot {
-  std::uint32_t clip = gltf::none;  ///< `none`: the rest pose
-  double time = 0;                  ///< seconds
+  std::uint32_t clip = noIndex;  ///< `none`: the rest pose
+  double time = 0;               ///< seconds
   std::array<Method, 2> methods{Method::dualQuaternion, Method::linear};
   std::uint32_t views = 1;  ///< 2: side by side
   OrbitCamera camera;
@@ -37,8 +37,8 @@ struct Shot {
 
 struct Joint {
   std::string name;
-  std::uint32_t node = gltf::none;
-  std::uint32_t parent = gltf::none;  ///< nearest ancestor that is a joint, in the same list
+  std::uint32_t node = noIndex;
+  std::uint32_t parent = noIndex;  ///< nearest ancestor that is a joint, in the same list
 };
 
 /// The joints of all skins that are drawn, without duplicates.

@@ -130,7 +130,7 @@ void Viewer::adopt(Result<cli::Scene> scene) {
 Result<void> Viewer::showScene(cli::Scene scene) {
   Result<std::unique_ptr<SceneView>> made = SceneView::create(window_.device(), std::move(scene));
   if (!made) return made.error();
-  const std::uint32_t clip = (*made)->scene().model->clips.empty() ? gltf::none : 0u;
+  const std::uint32_t clip = (*made)->scene().model->clips.empty() ? noIndex : 0u;
   if (const Result<Box> box = (*made)->extent(clip); !box) return box.error();
   view_ = std::move(*made);
   drawn_.reset();

@@ -67,10 +67,10 @@ class Viewer {
   Window& window_;
   State state_;
   std::unique_ptr<SceneView> view_;
-  std::optional<std::string> opens_;       ///< the file to load next
-  std::string path_;                       ///< of the file that is being loaded
-  std::optional<Shot> drawn_;              ///< the last picture of the view
-  std::uint32_t framedClip_ = gltf::none;  ///< the last clip that could be shown
+  std::optional<std::string> opens_;    ///< the file to load next
+  std::string path_;                    ///< of the file that is being loaded
+  std::optional<Shot> drawn_;           ///< the last picture of the view
+  std::uint32_t framedClip_ = noIndex;  ///< the last clip that could be shown
   Clock::time_point lastUpdate_ = Clock::now();
   int framesToDraw_ = 3;  ///< of the interface, which needs some to settle
   std::uint32_t shownFrames_ = 0;

@@ -61,15 +61,15 @@ inline constexpr VkBufferUsageFlags vertexBufferUsage =
 // what `record` reads. Dermis records the barriers between its own commands, and does not track the
 // state of resources.
 //
-//   context.recordBarrier(commandBuffer, barrierBetween(Use::vertexInput, Use::dermis));
+//   context.recordBarrier(commandBuffer, Use::vertexInput, Use::dermis);
 //   context.record(commandBuffer, plan, bindings);  // or SceneRecorder::record
-//   context.recordBarrier(commandBuffer, barrierBetween(Use::dermis, Use::vertexInput));
+//   context.recordBarrier(commandBuffer, Use::dermis, Use::vertexInput);
 
 /// Which half of a queue-family ownership transfer a barrier is. A transfer needs two barriers with
-/// the same uses: the release on the queue of the first, and the acquire on the queue of the
-/// second. Vulkan ignores the destination of a release and the source of an acquire (Vulkan 1.3,
-/// 7.7.4). The host has no queue family: uses by it are left out of a transfer. If no others are
-/// before or after it, all three values give the same barrier.
+/// the same uses: the release on the queue that used the buffer, and the acquire on the queue that
+/// will use it. Vulkan ignores the destination of a release and the source of an acquire (Vulkan
+/// 1.3, 7.7.4). The host has no queue family. So its uses are left out of a transfer; and where it
+/// alone uses the buffer before or after, there is no transfer, and all three values are the same.
 enum class QueueTransfer : std::uint8_t { none = 0, release = 1, acquire = 2 };
 
 /// Stages and accesses of both sides of a barrier. VkPipelineStageFlags2 and VkAccessFlags2 have
@@ -289,12 +289,13 @@ class DERMIS_VULKAN_API Context {
   Tuning tuning() const;
 
   /// Builds every pipeline that instances with these needs can use, in plans that are made with
-  /// `tuning()`. For other tunings use `pipelines`. If `PipelineNeeds::mesh` and `promise` are
-  /// empty, these are the pipelines for any mesh, pose and morph targets. Once all needs are
-  /// prepared, `record` never fails with `notPrepared`. May take long: call it from a loading
-  /// thread. If it fails (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of
-  /// `KernelSource::get`), the pipelines that were built before remain.
-  Result<void> prepare(const PipelineNeeds& needs) const;
+  /// this tuning; if empty, with `tuning()`. If `PipelineNeeds::mesh` and `promise` are empty,
+  /// these are the pipelines for any mesh, pose and morph targets. Once all needs are prepared,
+  /// `record` never fails with `notPrepared`. May take long: call it from a loading thread. If it
+  /// fails
+  /// (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of `KernelSource::get`), the
+  /// pipelines that were built before remain.
+  Result<void> prepare(const PipelineNeeds& needs, const std::optional<Tuning>& tuning = {}) const;
 
   /// Builds these pipelines. Those that exist are skipped. For jobs whose attributes are not placed
   /// by a `VertexLayout`: `pipelines` lists all that they can need, `Plan::pipelines` those of one
@@ -344,10 +345,9 @@ class DERMIS_VULKAN_API Context {
   Result<void> record(VkCommandBuffer commandBuffer, const Plan& plan,
                       const Bindings& bindings) const;
 
-  /// Records a barrier for all memory, as `barrierBetween` returns it. Call it outside a render
-  /// pass. Records nothing if nothing waits: if it has no uses on one side, or is one half of a
-  /// queue transfer. A transfer needs a barrier of its buffer, which the engine records itself.
-  void recordBarrier(VkCommandBuffer commandBuffer, const Barrier& barrier) const;
+  /// Records `barrierBetween(before, after)` for all memory. Call it outside a render pass. Records
+  /// nothing if there are no uses on one side.
+  void recordBarrier(VkCommandBuffer commandBuffer, Use before, Use after) const;
 
  private:
   Context();

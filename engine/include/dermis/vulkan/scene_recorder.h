@@ -90,8 +90,8 @@ struct SceneRecorderDescription {
   BufferRange gpuPoses;  ///< for poses that a GPU pass of the engine writes
   BufferRange output;
   /// What the engine uses the output buffer for, if the recorder creates it. For example
-  /// `vertexBufferUsage`, or that with `buildInputUsage` (drawing.h) or, to read vertices back,
-  /// VK_BUFFER_USAGE_TRANSFER_SRC_BIT. Dermis adds what it needs itself.
+  /// `vertexBufferUsage`, or that with `buildInputUsage` (drawing.h). Dermis adds what it needs
+  /// itself, and always VK_BUFFER_USAGE_TRANSFER_SRC_BIT.
   VkBufferUsageFlags outputUsage = vertexBufferUsage;
 
   /// Create and destroy all other buffers. Set both functions or none. Buffers are created by
@@ -115,7 +115,7 @@ struct FrameDescription {
   /// them through a mapping before the submission, without a barrier, to a buffer that no frame in
   /// flight uses.
   VkBuffer visibility{};
-  /// Bytes; a multiple of the device's minStorageBufferOffsetAlignment. This is not checked.
+  /// Bytes; a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`.
   VkDeviceSize visibilityOffset = 0;
 };
 
@@ -154,8 +154,9 @@ class DERMIS_VULKAN_API SceneRecorder {
                                       const SceneRecorderDescription& description = {});
 
   /// Call it before `create`, to find out what a range of the engine needs. `role` is `meshes`,
-  /// `poses`, `gpuPoses` or `positions` (the output). Returns usage and alignment, and the size for
-  /// the initial capacity in `description`. The alignment of the output need not be a power of two.
+  /// `poses`, `gpuPoses` or `output`. Returns usage and alignment, and the size
+  /// for the initial capacity in `description`. The alignment of the output need not be a power of
+  /// two.
   /// An instance begins at a multiple of its `VertexPlaces::alignment` from the beginning of the
   /// buffer. With the layouts of the instances, the size of the output has room for that, wherever
   /// the range begins, if the instances of each layout are interleaved and added one after the
@@ -174,8 +175,9 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// Stays at one address until the recorder is destroyed, even if the recorder is moved.
   Scene& scene() const;
 
-  /// `Context::prepare` with `Scene::pipelineNeeds`: builds the pipelines that such an instance can
-  /// need. May take long. To build pipelines in another thread, call the two.
+  /// Builds the pipelines that such an instance can need: `Context::prepare` with
+  /// `Scene::pipelineNeeds` and the tuning of this recorder. May take long. To build them in
+  /// another thread, call these two.
   Result<void> prepare(const InstanceDescription& instance) const;
 
   /// Records the uploads and the commands of the frame, with the barriers between them. Records
@@ -188,7 +190,7 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;
   /// - `invalidArgument` if `beginFrame` was not called, or if instances are culled on the GPU and
-  ///   `FrameDescription::visibility` is null;
+  ///   `FrameDescription::visibility` is null or its offset is misaligned;
   /// - `limitExceeded` if the tables are larger than a storage buffer range;
   /// - `vulkanError`, or the error of `BufferCallbacks::create`.
   ///

@@ -169,6 +169,9 @@ class BankWriter {
             record.tracks + i, &track);
         ++report.animatedTracks;
         report.keyCount += track.keys.size();
+        const double rate = clip.rate / std::ldexp(1, track.level);
+        report.slowestRate = report.slowestRate == 0 ? rate : std::min(report.slowestRate, rate);
+        report.fastestRate = std::max(report.fastestRate, rate);
       }
     }
     record.classCount = static_cast<std::uint32_t>(classes.size());

@@ -564,7 +564,8 @@ void Encoder::appendCulledDispatches() {
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);
     dispatch.groupCountX = dispatch.groupCountY = dispatch.workgroupCount = 0;
-    dispatch.indirectOffset = (culled_.arguments + index * abi::INDIRECT_WORDS) * 4;
+    dispatch.indirect.offset = (culled_.arguments + index * abi::INDIRECT_WORDS) * 4;
+    dispatch.indirect.size = 12;  // VkDispatchIndirectCommand
   }
   visibility_[1].command.workgroupCount = static_cast<std::uint32_t>(count);
 }
@@ -685,6 +686,7 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   auto& command = std::get<DispatchCommand>(
       plan_->commands.emplace_back(std::in_place_type<DispatchCommand>, dispatch.command));
   command.bindings = std::span(bindings).subspan(first);
+  if (command.indirect.size != 0) command.indirect.buffer = tables.buffer;
   if (std::ranges::find(plan_->pipelines, command.pipeline) == plan_->pipelines.end())
     plan_->pipelines.push_back(command.pipeline);
 }

@@ -39,7 +39,7 @@ struct PlanSizes {
 /// The buffers that the commands of a plan name. Their sizes are at most storage buffer ranges, but
 /// for outputs.
 struct PlanBuffers {
-  std::array<BufferPart, bufferRoleCount> parts;  ///< by role; `noBuffer` if there is none
+  std::array<BufferPart, bufferRoleCount> parts;  ///< by role; `noIndex` if there is none
   std::vector<BufferPart> poses;                  ///< of a scene: of both kinds, by their index
 
   BufferPart& operator[](BufferRole role) { return parts[static_cast<std::size_t>(role)]; }

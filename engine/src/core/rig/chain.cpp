@@ -183,7 +183,7 @@ Result<RepairedMesh> bendChain(const MeshView& mesh, std::span<const RigJoint> j
   MeshView bent = old;
   const InfluenceSet newSet{
       {newJoints.data(), old.vertexCount, newSlots * 4, ComponentType::uint32, newSlots},
-      floatAttribute(newWeights.data(), old.vertexCount, newSlots)};
+      attributeView(newWeights.data(), old.vertexCount, newSlots)};
   bent.influenceSets = {&newSet, 1};
   return repair(bent, static_cast<std::uint32_t>(joints.size()));
 }

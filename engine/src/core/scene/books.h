@@ -65,11 +65,11 @@ inline constexpr std::size_t prefetchDistance = 8;
 
 /// A buffer that the owner created.
 struct SceneBufferMemory {
-  std::uint32_t number = noBuffer;
+  std::uint32_t number = noIndex;
   std::uint64_t size = 0;
   std::byte* mapped = nullptr;
 
-  bool exists() const { return number != noBuffer; }
+  bool exists() const { return number != noIndex; }
 };
 
 /// A buffer that may be replaced by a larger one with the same contents.
@@ -458,7 +458,7 @@ struct SceneBooks {
   Store meshStore_, unitStore_, outputStore_, resultStore_;
   GrowingBuffer history_;
   SceneBufferMemory tables_;
-  std::uint32_t output_ = noBuffer;  ///< the buffer of the last frame
+  std::uint32_t output_ = noIndex;  ///< the buffer of the last frame
   std::deque<PoseStore> poseBuffers_;
   std::uint64_t slotCapacity_ = 0;  ///< of instances
   Groups groups_;

@@ -251,7 +251,7 @@ void SceneBooks::gatherResults() {
     const std::uint64_t end =
         (last + 1) * bits - static_cast<std::uint64_t>(std::countl_zero(marks[last]));
     resultCopies_.push_back(
-        {resultStore_.buffer.now.number, noBuffer, first * sizeof(InstanceResult),
+        {resultStore_.buffer.now.number, noIndex, first * sizeof(InstanceResult),
          readBackResults + first * sizeof(InstanceResult), (end - first) * sizeof(InstanceResult)});
     begin = last;
   }

@@ -1,6 +1,7 @@
 // The commands of a frame.
 
 #include <chrono>
+#include <string>
 #include <utility>
 
 #include "vulkan/recorder/state.h"
@@ -51,6 +52,12 @@ Result<void> SceneRecorder::State::recordFrame(VkCommandBuffer commandBuffer,
     return Error{ErrorCode::invalidArgument,
                  "FrameDescription::visibility is null, but there are instances that are culled on "
                  "the GPU"};
+  }
+  const std::uint32_t alignment = context->limits.minStorageBufferOffsetAlignment;
+  if (frame.visibilityOffset % alignment != 0) {
+    return Error{ErrorCode::invalidArgument,
+                 "FrameDescription::visibilityOffset is " + std::to_string(frame.visibilityOffset) +
+                     ", but must be a multiple of " + std::to_string(alignment)};
   }
   bound[visibilityBuffer].range = {frame.visibility, frame.visibilityOffset,
                                    scene->visibilityCount() * VkDeviceSize{4}};

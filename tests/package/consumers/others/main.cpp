@@ -57,8 +57,8 @@ Result<bool> skinTriangle() {
   const gltf::PrimitiveView view(model->meshes[skinned.mesh].primitives[skinned.primitive]);
   const Result<PackedMesh> packed = pack(view.mesh(), 1);
   if (!packed) return packed.error();
-  const std::vector<JointMatrix> palette = gltf::pose(*model, skinned.skin, gltf::none, 0);
-  const std::vector<float> weights = gltf::morphWeights(*model, skinned.node, gltf::none, 0);
+  const std::vector<JointMatrix> palette = gltf::pose(*model, skinned.skin, noIndex, 0);
+  const std::vector<float> weights = gltf::morphWeights(*model, skinned.node, noIndex, 0);
   const MorphWeight morph{0, weights.at(0)};
   const auto vertices = reference::skin(view.mesh(), palette, Method::dualQuaternion, {&morph, 1});
   if (!vertices) return vertices.error();
@@ -103,7 +103,7 @@ Result<bool> skinTriangle() {
   if (const Result<void> begun = scene->scene().beginFrame(1, 0); !begun) return begun.error();
   scene->scene().writePose(inScene.pose)->front() = palette.front();
   std::memset(skinnedFloats, 0, sizeof(skinnedFloats));
-  for (const cpu::PlannedJob& planned : *scene->jobs()) cpu::skin(planned);
+  for (const cpu::PlannedJob& planned : *scene->jobs()) cpu::run(planned);
   return isExpected();
 }
 

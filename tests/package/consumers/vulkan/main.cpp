@@ -102,11 +102,11 @@ bool isPackable(float value) {
   const std::uint8_t joints[3] = {};
   InfluenceSet influences;
   influences.joints = {joints, 3, 1, ComponentType::uint8, 1};
-  influences.weights = floatAttribute(weights, 3, 1);
+  influences.weights = attributeView(weights, 3, 1);
   MeshView mesh;
   mesh.name = "triangle";
   mesh.vertexCount = 3;
-  mesh.positions = floatAttribute(positions, 3, 3);
+  mesh.positions = attributeView(positions, 3, 3);
   mesh.influenceSets = {&influences, 1};
   return pack(mesh, 1).ok();
 }
