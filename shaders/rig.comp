@@ -31,7 +31,7 @@ layout(set = 0, binding = BINDING_DRIVEN, std430) buffer DrivenWords { uint driv
 RigRecord pose;
 uint writtenJoints;
 uint weightWord;   // in the buffer of driven joints: of the first weight
-uint scratchUnit;  // the same: behind the weights, a unit for each input of any corrective
+uint scratchUnit;  // the same: behind the weights, a unit for each input of a corrective, then a word for each of its examples
 
 uvec4 rigUnit(uint word) { return clipUnit((push.rig + word) / 4u); }
 vec4 rigNumbers(uint word) { return uintBitsToFloat(rigUnit(word)); }
@@ -96,7 +96,6 @@ void evaluateTwist(uint data) {
 // What there is of a corrective, beside its outputs.
 struct Corrective {
   uint inputCount;
-  uint exampleCount;
   uint examples;  // word: a quaternion for each input of each
   float factor;
   vec4 rotation;  // of the first input; those of several are in the scratch
@@ -121,17 +120,20 @@ void evaluateCorrective(uint data) {
   uvec4 counts = rigUnit(data);     // inputs, examples, weights, joints
   uvec4 head = rigUnit(data + 4u);  // first weight, factor
   data += RIG_CORRECTIVE_WORDS;
-  Corrective corrective = Corrective(counts.x, counts.y, data + counts.x * RIG_SENSOR_WORDS, uintBitsToFloat(head.y), vec4(0.0));
+  Corrective corrective = Corrective(counts.x, data + counts.x * RIG_SENSOR_WORDS, uintBitsToFloat(head.y), vec4(0.0));
   for (uint i = 0u; i < counts.x; ++i) {
     vec4 rotation = rotationAt(data + i * RIG_SENSOR_WORDS);
     corrective.rotation = rotation;
     if (counts.x != 1u) driven[scratchUnit + i] = floatBitsToUint(rotation);
   }
+  uint basisWord = 4u * (scratchUnit + counts.x);
+  for (uint example = 0u; example < counts.y; ++example)
+    drivenWords[basisWord + example] = floatBitsToUint(basisAt(corrective, example));
   data = corrective.examples + 4u * counts.x * counts.y;
   for (uint first = 0u; first < counts.z; first += 4u) {
     precise vec4 sums = vec4(0.0);
     for (uint example = 0u; example < counts.y; ++example) {
-      sums = fma(vec4(basisAt(corrective, example)), rigNumbers(data), sums);
+      sums = fma(vec4(uintBitsToFloat(drivenWords[basisWord + example])), rigNumbers(data), sums);
       data += 4u;
     }
     [[dont_unroll]] for (uint i = 0u; i < min(4u, counts.z - first); ++i)
@@ -146,7 +148,7 @@ void evaluateCorrective(uint data) {
     precise vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
     precise vec4 scale = vec4(1.0);
     for (uint example = 0u; example < counts.y; ++example) {
-      vec4 basis = vec4(basisAt(corrective, example));
+      vec4 basis = vec4(uintBitsToFloat(drivenWords[basisWord + example]));
       shift = fma(basis, rigNumbers(data), shift);
       turn = fma(basis, rigNumbers(data + 4u), turn);
       scale = fma(basis, rigNumbers(data + 8u), scale);

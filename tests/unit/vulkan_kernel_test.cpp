@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -13,6 +14,7 @@
 
 #include "abi.h"
 #include "dermis_kernels.h"
+#include "dermis_kernels_recipes.h"
 
 namespace dermis::test {
 namespace {
@@ -107,13 +109,30 @@ TEST(KernelTest, RecordsAreReadBeforeOthersOverwriteThem) {
 
 /// All modules, by the names that shaders/CMakeLists.txt gives them.
 std::vector<std::string> moduleNames() {
-  std::vector<std::string> names{"palette", "palette_logarithms", "clear", "visibility",
-                                 "skin_staged"};
-  for (const std::string family : {"skin", "skin_bulge", "skin_comparison"}) {
-    for (const std::string form : {"", "_one_output", "_texels", "_extras", "_extras_texels"})
-      names.push_back(family + form);
-  }
+  std::vector<std::string> names;
+  for (const kernels::Recipe& recipe : kernels::recipes) names.push_back(recipe.name);
   return names;
+}
+
+// All others, those of clips and rigs among them, promise to have none: their invocations do not
+// depend on each other, and may return early.
+TEST(KernelTest, FewKernelsHaveBarriersOrSharedMemory) {
+  constexpr std::uint32_t opVariable = 59, workgroupStorage = 4;
+  const std::set<std::string> allowed{"palette", "palette_logarithms", "visibility", "skin_staged"};
+  const std::vector<std::string> names = moduleNames();
+  for (const std::string needed :
+       {"sample", "sample_texels", "compose", "compose_texels", "rig", "rig_texels", "morph_lists"})
+    EXPECT_EQ(std::ranges::count(names, needed), 1) << needed;
+  for (const std::string& name : names) {
+    SCOPED_TRACE(name);
+    std::size_t barriers = 0, shared = 0;
+    for (const auto& [opcode, operands] : instructionsOf(kernels::find(name))) {
+      if (opcode == opControlBarrier) ++barriers;
+      if (opcode == opVariable && operands[2] == workgroupStorage) ++shared;
+    }
+    EXPECT_EQ(barriers > 0, allowed.contains(name));
+    EXPECT_EQ(shared > 0, allowed.contains(name));
+  }
 }
 
 // What a device must have: a workgroup of any subgroup size, which may flush denormals. A kernel

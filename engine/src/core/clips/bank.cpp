@@ -2,8 +2,10 @@
 #include "clips/bank.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -69,6 +71,13 @@ class BankCheck {
   bool areFinite(std::uint64_t offset, std::uint64_t count) {
     return allAre([](float number) { return std::isfinite(number); }, offset, count);
   }
+  /// One of another length would scale the pose of a skin that `rigidSkins` calls rigid: the
+  /// rotation at rest is used as it is stored, and float32 cannot normalize a very short one.
+  static bool isUnit(std::span<const float, 4> rotation) {
+    double square = 0;
+    for (const float number : rotation) square += double{number} * double{number};
+    return std::abs(square - 1) <= 1e-5;
+  }
   bool areFactors(std::uint64_t offset, std::uint64_t count) {
     return allAre([](float factor) { return factor >= 0 && factor <= 1; }, offset, count);
   }
@@ -77,8 +86,7 @@ class BankCheck {
     const BankNode node = bank_.node(index);
     const auto isFinite = [](float number) { return std::isfinite(number); };
     return (node.parent == noNode || node.parent < index) &&
-           std::ranges::all_of(node.translation, isFinite) &&
-           std::ranges::all_of(node.rotation, isFinite) &&
+           std::ranges::all_of(node.translation, isFinite) && isUnit(node.rotation) &&
            std::ranges::all_of(node.scale, isFinite) &&
            isFinite(node.translationError + node.rotationError + node.scaleError) &&
            (node.fixed == 0 || (node.fixed % 4 == 0 && areFinite(node.fixed, 12)));
@@ -126,7 +134,8 @@ class BankCheck {
       case TrackKind::rest:
         return word == 0;
       case TrackKind::constant:
-        return areFinite(word & 0x3fffffff, isRotation ? 4 : 3);
+        return areFinite(word & 0x3fffffff, isRotation ? 4 : 3) &&
+               (!isRotation || isUnit(bank_.at<std::array<float, 4>>(word & 0x3fffffff)));
       case TrackKind::animated: {
         const std::uint32_t number = word >> trackColumnBits & 255;
         if (number >= clip.classCount) return false;

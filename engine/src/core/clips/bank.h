@@ -263,7 +263,7 @@ static_assert(sizeof(BankHeader) == 64 && sizeof(BankNode) == 64 && sizeof(BankS
               sizeof(BankClass) == 32);
 
 /// Checks the length, the version, the checksum, every offset and index, and that numbers are
-/// finite. O(words).
+/// finite and rotations of unit length. O(words).
 Result<void> checkClips(std::span<const std::uint32_t> words);
 
 }  // namespace dermis

@@ -73,7 +73,7 @@ double normalizeQuaternion(std::span<double, 4> quaternion) {
   double square = 0;
   for (const double component : quaternion) square += component * component;
   const double length = std::sqrt(square);
-  if (!(length > 0) || !std::isfinite(length)) {
+  if (!std::isnormal(square)) {
     std::ranges::copy(std::array<double, 4>{0, 0, 0, 1}, quaternion.begin());
     return length;
   }

@@ -24,8 +24,8 @@ const float* keyPart(const ChannelView& channel, std::size_t width, std::size_t 
 DERMIS_CORE_API void interpolate(const ChannelView& channel, double time, std::span<double> value,
                                  Side side = Side::after);
 
-/// Divides a quaternion by its length, and returns the length. If that is impossible (length 0 or
-/// not finite), it becomes the identity.
+/// Divides a quaternion by its length, and returns the length. If that is impossible or not exact
+/// (the square of the length is 0, denormal or not finite), it becomes the identity.
 DERMIS_CORE_API double normalizeQuaternion(std::span<double, 4> quaternion);
 
 }  // namespace dermis

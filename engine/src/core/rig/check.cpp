@@ -43,6 +43,9 @@ class RigCheck {
       if (std::ranges::find(*made, false) != made->end())
         return storedRig.damaged("a joint or a weight has no driver");
     }
+    // `evaluateRig` allocates memory for them.
+    if (header.mostInputs != mostInputs_)
+      return storedRig.damaged("its header does not fit its drivers");
     return {};
   }
 
@@ -115,9 +118,11 @@ class RigCheck {
     if (!isSection(data, 1, abi::RIG_CORRECTIVE_WORDS)) return false;
     const auto record = rig_.at<RigCorrective>(data);
     const std::uint64_t inputs = record.inputCount, examples = record.exampleCount;
-    if (inputs == 0 || inputs > rig_.header.mostInputs || examples == 0 ||
-        examples > maxRigExamples || !(record.factor <= 0) || !std::isfinite(record.factor))
+    // A GPU may take a denormal factor for 0, which stands for linear functions.
+    if (inputs == 0 || examples == 0 || examples > maxRigExamples || record.factor > 0 ||
+        !(record.factor == 0 || std::isnormal(record.factor)))
       return false;
+    mostInputs_ = std::max(mostInputs_, record.inputCount);
     std::uint64_t offset = data + std::uint64_t{abi::RIG_CORRECTIVE_WORDS};
     if (!isSection(offset, inputs, abi::RIG_SENSOR_WORDS)) return false;
     for (std::size_t i = 0; i < inputs; ++i) {
@@ -184,13 +189,14 @@ class RigCheck {
   RigBlob rig_;
   std::uint64_t taken_ = sizeof(RigHeader) / 4;
   std::vector<bool> isDriven_, isWeighed_;  ///< so far
+  std::uint32_t mostInputs_ = 0;            ///< the same, of a corrective
 };
 
 }  // namespace
 
 Result<void> checkRig(std::span<const std::uint32_t> words) {
   const RigHeader header = RigBlob(words).header;
-  if (!RigCheck::isSmall(header) || header.mostInputs > header.wordCount)
+  if (!RigCheck::isSmall(header))
     return storedRig.damaged("its header has counts that are not valid");
   return RigCheck(words).run();
 }

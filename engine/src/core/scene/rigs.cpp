@@ -45,8 +45,10 @@ Result<void> SceneBooks::takeDriven(ScenePose& pose, std::uint32_t rig) {
   if (rig == notUsed) return {};
   const RigHeader header = RigBlob(*rigs_.at(rig).rig).header;
   const std::uint64_t weights = std::uint64_t{header.givenWeights} + header.drivenWeights;
-  // Kernels also keep a unit for each input of a corrective there.
-  const std::uint64_t words = owner_.isCpu ? weights : weights + 3 + 4ull * header.mostInputs;
+  // Kernels also keep a unit for each input of a corrective there, and a word for each example.
+  const std::uint64_t ofCorrective =
+      header.mostInputs == 0 ? 0 : 4ull * header.mostInputs + maxRigExamples;
+  const std::uint64_t words = owner_.isCpu ? weights : weights + 3 + ofCorrective;
   const std::uint64_t joints =
       header.drivenJoints + jointsFor(words) + (owner_.isCpu ? header.writtenJoints : 0);
   const Result<std::optional<Range>> taken = takeJoints(joints, !owner_.isCpu, pose.drivenBuffer);
