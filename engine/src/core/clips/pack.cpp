@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -69,6 +70,13 @@ Local restOf(const SkeletonNode& node) {
   const auto &t = node.translation, &s = node.scale;
   return {{{t[0], t[1], t[2], 0}, normalized(node.rotation), {s[0], s[1], s[2], 0}}};
 }
+
+/// Where a point that a joint moves is farthest from where the clip has it.
+struct PoseError {
+  double distance = 0;
+  std::size_t node = 0;  ///< a moved one: the joint
+  double time = 0;
+};
 
 /// What decides how exact a node must be in a clip, at most at any time.
 struct Needs {
@@ -470,9 +478,8 @@ class Packer {
         !good)
       return good.error();
     // Errors of joints add up along a chain. The share of each is made smaller until the sum fits.
-    double share = 1, worst = 0;
-    std::size_t worstNode = 0;
-    double worstTime = 0;
+    double share = 1;
+    PoseError worst;
     const std::uint64_t memoryLeft = memoryLeft_;
     for (int attempt = 0; attempt < 16; ++attempt, share *= 0.6) {
       memoryLeft_ = memoryLeft;
@@ -493,11 +500,11 @@ class Packer {
               isAtRest ? atRest_ : std::make_shared<const Track>(*std::move(track));
         }
       }
-      worst = errorOf(number, packed, source, duration, split.has_value(), worstNode, worstTime);
-      if (worst <= maxError_) break;
+      worst = errorOf(number, packed, source, duration, split.has_value());
+      if (worst.distance <= maxError_) break;
     }
-    if (!(worst <= maxError_))
-      return unkept(where(number, moved_[worstNode].source), "maxError", maxError_, packed.rate);
+    if (!(worst.distance <= maxError_))
+      return unkept(where(number, moved_[worst.node].source), "maxError", maxError_, packed.rate);
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       float* const errors[] = {&moved_[i].error.translation, &moved_[i].error.rotation,
                                &moved_[i].error.scale};
@@ -507,9 +514,10 @@ class Packer {
         *errors[p] = std::max(*errors[p], static_cast<float>(error));
       }
     }
-    if (worst > report.worstError) {
-      report.worstError = worst;
-      report.worst = where(number, moved_[worstNode].source) + ", at " + decimal(worstTime) + " s";
+    if (worst.distance > report.worstError) {
+      report.worstError = worst.distance;
+      report.worst =
+          where(number, moved_[worst.node].source) + ", at " + decimal(worst.time) + " s";
     }
     if (split) memoryLeft_ += split->bytes;
     return packed;
@@ -641,45 +649,68 @@ class Packer {
     return motionMatrix(motionBetween(at(0), at(time), double{motion_->length}), motion_->upAxis);
   }
 
-  /// The largest distance between a point that a joint moves and where the clip has it. `isSplit`:
-  /// the motion was taken out.
-  double errorOf(std::size_t number, const FittedClip& packed,
-                 const std::vector<std::array<Curve, 3>>& curves, double duration, bool isSplit,
-                 std::size_t& worstNode, double& worstTime) const {
-    const std::vector<std::pair<double, double>> skipped = nearJumps(packed, curves, duration);
-    auto next = skipped.begin();
-    const double steps = std::clamp(std::ceil(duration * packed.rate * 4), 1.0, 8000.0);
-    double worst = 0;
-    for (double step = 0; step <= steps; ++step) {
-      const double time = step / steps * duration;
-      while (next != skipped.end() && next->second < time) ++next;
-      if (next != skipped.end() && next->first <= time) continue;
-      const std::vector<Transform> exact =
-          globalsOf(number, [&](std::size_t i, std::size_t p) { return curves[i][p].at(time); });
-      std::vector<Transform> stored = globalsOf(number, [&](std::size_t i, std::size_t p) {
-        return packed.tracks[i][p]->at(time, packed.rate, stillOf(number, i)[p], p == 1);
-      });
-      if (isSplit) {
-        const Transform motion = motionAt(packed, time);
-        for (std::size_t i = 0; i < moved_.size(); ++i) {
-          if (isCarried_[i]) stored[i] = multiply(motion, stored[i]);
-        }
-      }
+  /// Measures the pose at a time. `isSplit`: the motion was taken out.
+  void measure(std::size_t number, const FittedClip& packed,
+               const std::vector<std::array<Curve, 3>>& curves, bool isSplit, double time,
+               PoseError& worst) const {
+    const std::vector<Transform> exact =
+        globalsOf(number, [&](std::size_t i, std::size_t p) { return curves[i][p].at(time); });
+    std::vector<Transform> stored = globalsOf(number, [&](std::size_t i, std::size_t p) {
+      return packed.tracks[i][p]->at(time, packed.rate, stillOf(number, i)[p], p == 1);
+    });
+    if (isSplit) {
+      const Transform motion = motionAt(packed, time);
       for (std::size_t i = 0; i < moved_.size(); ++i) {
-        const MovedNode& node = moved_[i];
-        const double distance = node.reach / std::max(scaleOf(node.global), 1e-30);
-        for (std::size_t axis = 0; axis < 6; ++axis) {
-          Point point{};
-          point[axis / 2] = axis % 2 == 0 ? distance : -distance;
-          const double error = apart(transformed(exact[i], point), transformed(stored[i], point));
-          if (std::isnan(error)) return std::numeric_limits<double>::infinity();
-          if (error <= worst) continue;
-          worst = error;
-          worstNode = i;
-          worstTime = time;
-        }
+        if (isCarried_[i]) stored[i] = multiply(motion, stored[i]);
       }
     }
+    for (std::size_t i = 0; i < moved_.size(); ++i) {
+      const MovedNode& node = moved_[i];
+      const double reach = node.reach / std::max(scaleOf(node.global), 1e-30);
+      for (std::size_t axis = 0; axis < 6; ++axis) {
+        Point point{};
+        point[axis / 2] = axis % 2 == 0 ? reach : -reach;
+        double error = apart(transformed(exact[i], point), transformed(stored[i], point));
+        if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
+        if (error > worst.distance) worst = {error, i, time};
+      }
+    }
+  }
+
+  /// At how many steps `errorOf` measures a clip: 8 for each of its finest intervals, but at most
+  /// 32,768, so that the import of long clips takes seconds.
+  double measuredSteps(const FittedClip& packed, double duration) const {
+    int finest = 0;
+    for (const auto& tracks : packed.tracks) {
+      for (const auto& track : tracks) finest = std::min(finest, track->level);
+    }
+    if (motion_) finest = std::min(finest, packed.vectorTracks.back().level);
+    return std::clamp(8 * std::ceil(duration * packed.rate / std::ldexp(1, finest)), 1.0, 32768.0);
+  }
+
+  /// The largest error of whole poses. Stops at the first above `maxError_`.
+  PoseError errorOf(std::size_t number, const FittedClip& packed,
+                    const std::vector<std::array<Curve, 3>>& curves, double duration,
+                    bool isSplit) const {
+    const std::vector<std::pair<double, double>> skipped = nearJumps(packed, curves, duration);
+    PoseError worst;
+    const auto measureAt = [&](double time) {
+      time = std::clamp(time, 0.0, duration);
+      const auto next =
+          std::ranges::lower_bound(skipped, time, {}, &std::pair<double, double>::second);
+      if (next != skipped.end() && next->first <= time) return;
+      measure(number, packed, curves, isSplit, time, worst);
+    };
+    // Halfway between two keys, normalized interpolation is exact: errors that add up along a chain
+    // are not seen there. Multiples of the golden ratio spread the times over all fractions.
+    const double steps = measuredSteps(packed, duration), step = duration / steps;
+    for (double i = 0; i <= steps && worst.distance <= maxError_; ++i) {
+      const double turns = i * std::numbers::phi;
+      measureAt((i + turns - std::floor(turns)) * step);
+    }
+    // The largest error is likely near the largest found.
+    const double found = worst.time;
+    for (int i = -16; i <= 16 && worst.distance <= maxError_; ++i) measureAt(found + i * step / 8);
     return worst;
   }
 

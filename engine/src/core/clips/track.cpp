@@ -46,6 +46,12 @@ KeyBits vectorBits(const Value& v, KeyFormat format, const std::array<float, 8>&
   return key;
 }
 
+/// At how many points of an interval a curve is measured.
+int pointsOf(const std::optional<double>& curvature, int level) {
+  if (curvature == 0.0) return 1;
+  return std::max(curvature ? 4 : 16, 32 >> std::max(0, -3 - level));
+}
+
 /// A curve at one level: what its keys should be, and how far those of a track are off.
 class Fit {
  public:
@@ -55,8 +61,7 @@ class Fit {
         duration_(duration),
         interval_(std::ldexp(1, level) / rate),
         tolerance_(tolerance),
-        points_(curve.curvature(0, duration) == 0.0 ? 1
-                                                    : std::max(4, 32 >> std::max(0, -3 - level))),
+        points_(pointsOf(curve.curvature(0, duration), level)),
         jumpTimes_(jumpTimes),
         keyTimes_(keyTimes) {
     const double intervals = std::max(1.0, std::ceil(duration / interval_ - 1e-6));
