@@ -69,27 +69,29 @@ uint stagedRecords;     // records of this workgroup: fewer than its invocations
 uint firstStaged = 0u;  // start of the half that is filled next
 
 // Stores a record of the workgroup whose records begin at the word `begin`, unless they begin at no multiple of 8 bytes.
-bool storeUnits(uint begin, uint place, uint words[12]) {
+bool storeUnits(uint begin, uint words[12]) {
+  uint word = begin + gl_LocalInvocationID.x * RECORD_WORDS;
   bool byUnits = RECORD % 16u == 0u && begin % 4u == 0u;
   bool byPairs = RECORD % 8u == 0u && begin % 2u == 0u;
   if (gl_LocalInvocationID.x < stagedRecords) {
     if (byUnits) {
       for (uint i = 0u; i < RECORD_WORDS; i += 4u) {
-        positionsUnits[place / 16u + i / 4u] = uvec4(words[i], words[i + 1u], words[i + 2u], words[i + 3u]);
+        positionsUnits[word / 4u + i / 4u] = uvec4(words[i], words[i + 1u], words[i + 2u], words[i + 3u]);
       }
     } else if (byPairs) {
-      for (uint i = 0u; i < RECORD_WORDS; i += 2u) positionsPairs[place / 8u + i / 2u] = uvec2(words[i], words[i + 1u]);
+      for (uint i = 0u; i < RECORD_WORDS; i += 2u) positionsPairs[word / 2u + i / 2u] = uvec2(words[i], words[i + 1u]);
     }
   }
   return byUnits || byPairs;
 }
 
+// `place` is that of the first record of the workgroup, so that compilers see that it is the same for all invocations.
 void storeRecord(uint place, uvec4 position, uvec4 normal, uvec4 tangent) {
   uint own = gl_LocalInvocationID.x;
-  uint begin = place / 4u - own * RECORD_WORDS;  // word at which the workgroup's records begin
-  uint first = begin % 4u;                       // relative to the 16-byte unit that contains it
+  uint begin = place / 4u;  // word at which the workgroup's records begin
+  uint first = begin % 4u;  // relative to the 16-byte unit that contains it
   uint words[12] = recordWords(position, normal, tangent);
-  if (storeUnits(begin, place, words)) return;
+  if (storeUnits(begin, words)) return;
   uint filled = firstStaged;
   firstStaged = STAGED_WORDS - filled;
   for (uint i = 0u; i < RECORD_WORDS; ++i) staged[filled + first + own * RECORD_WORDS + i] = words[i];

@@ -129,7 +129,8 @@ BoxScale boxOf(InstanceRecord instance) {
   return BoxScale(vec3(r.centerX, r.centerY, r.centerZ), vec3(r.inverseX, r.inverseY, r.inverseZ));
 }
 
-// An instance, and the byte offsets of this invocation's vertex: positions, normals, tangents, previous positions.
+// An instance, and the byte offsets of this invocation's vertex (with STAGED: of the workgroup's first one): positions, normals,
+// tangents, previous positions.
 struct Instance {
   InstanceRecord record;
   uvec4 places;
@@ -267,13 +268,15 @@ void main() {
   if (index != 0u) number -= loadGroup(word - GROUP_WORDS).workgroupEnd;
   // Consecutive workgroups process all vertices for some instances, then all vertices for the next instances, so that palettes stay
   // in the cache.
-  uint run = (number % group.vertexGroups) * gl_WorkGroupSize.x * VERTICES + gl_LocalInvocationID.x;
-  uint vertex = group.firstVertex + run;
+  uint run = (number % group.vertexGroups) * gl_WorkGroupSize.x * VERTICES;
 #ifdef STAGED
   // All invocations reach each barrier. Those without a vertex skin the last vertex again; their staged records are never stored.
-  stagedRecords = min(group.vertexEnd - (vertex - gl_LocalInvocationID.x), gl_WorkGroupSize.x);
-  vertex = min(vertex, group.vertexEnd - 1u);
+  uint first = group.firstVertex + run;
+  stagedRecords = min(group.vertexEnd - first, gl_WorkGroupSize.x);
+  uint vertex = min(first + gl_LocalInvocationID.x, group.vertexEnd - 1u);
 #else
+  run += gl_LocalInvocationID.x;
+  uint vertex = group.firstVertex + run;
   if (vertex >= group.vertexEnd) return;
 #endif
   Share share = shareOf(group, number / group.vertexGroups);
