@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dermis/verify.h"
+#include "inexact_context.h"
 #include "kit/batch_runner.h"
 #include "random_rig.h"
 #include "test_device.h"
@@ -57,18 +58,23 @@ TEST_P(FlatJointsTest, AreNotTakenForMirrors) {
   const Result<PackedMesh> packed = pack(mesh.view(), jointCount);
   ASSERT_TRUE(packed.ok());
   const samples::SkinRequest request{&*packed, pose, JointPromise::scaling, method};
-  const Result<samples::BatchResult> result = samples::runBatch(device(), context(), {&request, 1});
-  ASSERT_TRUE(result.ok()) << result.error().message;
   const Result<reference::SkinnedMesh> expected = reference::skin(mesh.view(), pose, method);
   ASSERT_TRUE(expected.ok());
   const Exemptions exemptions{exemptionsOf(*expected).onlyFinite, 0};
-  const Result<Comparison> comparison =
-      compareWithReference(*expected, result->instances[0].view(), exemptions);
-  ASSERT_TRUE(comparison.ok());
-  EXPECT_TRUE(comparison->passed()) << "positions up to " << comparison->worstPosition
-                                    << " of the bound, normals up to " << comparison->worstNormal;
-  EXPECT_EQ(comparison->compared + comparison->exempt.onlyFinite, mesh.vertexCount());
-  EXPECT_LE(comparison->exempt.onlyFinite, mesh.vertexCount() / 100);
+  Inexact fused(device().description(), {"fused", {.fuses = true}});
+  ASSERT_TRUE(fused.context.ok());
+  for (vulkan::Context* const each : {&context(), &*fused.context}) {
+    SCOPED_TRACE(each == &context() ? "as the device rounds" : "where fma rounds once");
+    const Result<samples::BatchResult> result = samples::runBatch(device(), *each, {&request, 1});
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    const Result<Comparison> comparison =
+        compareWithReference(*expected, result->instances[0].view(), exemptions);
+    ASSERT_TRUE(comparison.ok());
+    EXPECT_TRUE(comparison->passed()) << "positions up to " << comparison->worstPosition
+                                      << " of the bound, normals up to " << comparison->worstNormal;
+    EXPECT_EQ(comparison->compared + comparison->exempt.onlyFinite, mesh.vertexCount());
+    EXPECT_LE(comparison->exempt.onlyFinite, mesh.vertexCount() / 100);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, FlatJointsTest, ::testing::ValuesIn(allMethods),
