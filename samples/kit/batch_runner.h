@@ -166,6 +166,10 @@ class BatchTarget {
   /// What figures that play these layers have as poses: figure by figure, one for each skin.
   virtual Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) = 0;
+  /// The morph weights of a node of the skeleton for each of these figures.
+  virtual Result<std::vector<std::vector<float>>> sampleWeights(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays,
+      std::uint32_t node) = 0;
   /// What a rig drives in each of these poses.
   virtual Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
                                                      std::span<const RigInput> inputs) = 0;
@@ -188,6 +192,10 @@ class VulkanTarget : public BatchTarget {
   /// As a scene samples them.
   Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
+  /// As a scene hands them to a rig.
+  Result<std::vector<std::vector<float>>> sampleWeights(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays,
+      std::uint32_t node) override;
   /// As a scene drives them.
   Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
                                              std::span<const RigInput> inputs) override;
@@ -213,6 +221,9 @@ class CpuTarget : public BatchTarget {
   std::unique_ptr<BatchRunner> runner(const RunOptions& options) override;
   Result<std::vector<std::vector<JointMatrix>>> samplePoses(
       const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) override;
+  Result<std::vector<std::vector<float>>> sampleWeights(
+      const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays,
+      std::uint32_t node) override;
   Result<std::vector<DrivenPose>> drivePoses(const PackedRig& rig,
                                              std::span<const RigInput> inputs) override;
 

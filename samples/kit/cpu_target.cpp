@@ -179,6 +179,16 @@ Result<std::vector<std::vector<JointMatrix>>> CpuTarget::samplePoses(
   }
   return poses;
 }
+Result<std::vector<std::vector<float>>> CpuTarget::sampleWeights(
+    const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays, std::uint32_t node) {
+  std::vector<std::vector<float>> all;
+  for (const std::vector<ClipLayer>& layers : plays) {
+    std::vector<float>& weights = all.emplace_back(bank.weightCount(node));
+    if (Result<void> sampled = dermis::sampleWeights(bank, layers, node, weights); !sampled)
+      return sampled.error();
+  }
+  return all;
+}
 Result<std::vector<DrivenPose>> CpuTarget::drivePoses(const PackedRig& rig,
                                                       std::span<const RigInput> inputs) {
   std::vector<DrivenPose> poses;

@@ -143,24 +143,29 @@ PackedMesh pointMesh() {
   return must(pack(mesh, 1));
 }
 
-/// Adds a figure for each of `plays`. Returns where the device keeps their poses.
+/// Adds a figure for each of `plays`. Returns where the device keeps their poses or, if their first
+/// poses have a rig, what it drives there.
 std::vector<vulkan::BufferRange> addFigures(vulkan::SceneRecorder& recorder,
                                             const PackedClips& bank,
-                                            std::span<const std::vector<ClipLayer>> plays) {
+                                            std::span<const std::vector<ClipLayer>> plays,
+                                            RigHandle rig = {}) {
   Scene& scene = recorder.scene();
   const ClipsHandle clips = must(scene.addClips(PackedClips(bank)));
   // A pose is sampled when an instance is skinned with it.
   InstanceDescription point;
   point.mesh = must(scene.addMesh(pointMesh()));
+  std::vector<RigHandle> rigs(bank.skinCount());
+  rigs[0] = rig;
   std::vector<vulkan::BufferRange> ranges;
   for (const std::vector<ClipLayer>& layers : plays) {
-    const FigurePlay play{must(scene.addFigure(clips)), layers};
+    const FigurePlay play{must(scene.addFigure(clips, rigs)), layers};
     must(scene.play({&play, 1}));
-    for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) {
+    for (std::uint32_t skin = 0; skin < (rig ? 1 : bank.skinCount()); ++skin) {
       point.pose = must(scene.pose(play.figure, skin));
       must(recorder.prepare(point));
       must(scene.addInstance(point));
-      ranges.push_back(must(recorder.poseRange(point.pose)));
+      ranges.push_back(
+          must(rig ? recorder.drivenRange(point.pose) : recorder.poseRange(point.pose)));
     }
   }
   return ranges;
@@ -213,6 +218,26 @@ std::vector<std::vector<JointMatrix>> sampledPoses(Device& device, const vulkan:
   for (const std::vector<std::byte>& bytes : runFrame(device, context, recorder, ranges))
     poses.push_back(arrayOf<JointMatrix>(bytes));
   return poses;
+}
+
+/// The given weights of a rig that drives nothing. Throws `Failure`.
+std::vector<std::vector<float>> sampledWeights(Device& device, const vulkan::Context& context,
+                                               const PackedClips& bank,
+                                               std::span<const std::vector<ClipLayer>> plays,
+                                               std::uint32_t node) {
+  const std::vector<RigJoint> joints(bank.jointCount(0));
+  RigView rig;
+  rig.joints = joints;
+  rig.writtenJoints = bank.jointCount(0);
+  rig.givenWeights = bank.weightCount(node);
+  rig.weightsOf = node;
+  vulkan::SceneRecorder recorder = must(vulkan::SceneRecorder::create(context));
+  const RigHandle added = must(recorder.scene().addRig(must(packRig(rig))));
+  const std::vector<vulkan::BufferRange> ranges = addFigures(recorder, bank, plays, added);
+  std::vector<std::vector<float>> weights;
+  for (const std::vector<std::byte>& bytes : runFrame(device, context, recorder, ranges))
+    weights.push_back(arrayOf<float>(bytes));
+  return weights;
 }
 
 /// Throws `Failure`.
@@ -276,6 +301,15 @@ Result<std::vector<std::vector<JointMatrix>>> VulkanTarget::samplePoses(
     const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays) {
   try {
     return sampledPoses(device_, context_, bank, plays);
+  } catch (const Failure& failure) {
+    return failure.error();
+  }
+}
+
+Result<std::vector<std::vector<float>>> VulkanTarget::sampleWeights(
+    const PackedClips& bank, std::span<const std::vector<ClipLayer>> plays, std::uint32_t node) {
+  try {
+    return sampledWeights(device_, context_, bank, plays, node);
   } catch (const Failure& failure) {
     return failure.error();
   }

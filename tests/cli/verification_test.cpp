@@ -204,13 +204,42 @@ std::map<std::string, std::size_t> casesByMethod(const std::string& json) {
   return count;
 }
 
+std::string write(const FileBuilder& file, const std::string& name) {
+  const std::string path = outFile(name);
+  std::ofstream(path) << file.text();
+  return path;
+}
+
+/// Clips of a model: all have one channel.
+void addClip(FileBuilder& file, const char* name, int node, const char* path,
+             const std::vector<float>& times, std::size_t values) {
+  file.json["animations"].push_back(
+      {{"name", name},
+       {"samplers", {{{"input", file.addFloats(times, "SCALAR")}, {"output", values}}}},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
+}
+
+/// Writes a figure with a morph target, a clip that turns it and one that grows its target.
+std::string modelWithClips(const std::string& name) {
+  FileBuilder file = skinnedTriangle();
+  file.primitive()["targets"] = {
+      {{"POSITION", file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3")}}};
+  file.json["skins"][0]["name"] = "figure";
+  addClip(file, "bend", 2, "rotation", {0, 1},
+          file.addFloats({0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4"));
+  addClip(file, "grow", 0, "weights", {0, 2}, file.addFloats({0.25f, 0.75f}, "SCALAR"));
+  return write(file, name);
+}
+
 // Each of the threads opens the device. That the report is the same for any number of them is
 // tested on the CPU below.
 TEST(VerificationTest, QuickSkinsWithEveryMethodOfTheDeviceInThreads) {
   REQUIRE_DEVICE();
   const std::string json = outFile("quick.json");
-  const CommandResult result = dermis({"verify", "--quick", "--json", json, "--threads", "3"});
+  const CommandResult result = dermis({"verify", modelWithClips("quick.gltf"), "--random",
+                                       "--quick", "--json", json, "--threads", "3"});
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
+  EXPECT_NE(readText(json).find("\"morph weights\""), std::string::npos);
   const std::map<std::string, std::size_t> count = casesByMethod(json);
   for (const Method method : allMethods)
     EXPECT_TRUE(count.contains(std::string(methodName(method)))) << methodName(method);
@@ -231,30 +260,8 @@ TEST(VerificationTest, ThreadsChangeNothingOnTheCpu) {
   expectTheSameInThreads({"verify", barModel, "--random", "--device", "cpu"});
 }
 
-/// Clips of a model: all have one channel.
-void addClip(FileBuilder& file, const char* name, int node, const char* path,
-             const std::vector<float>& times, std::size_t values) {
-  file.json["animations"].push_back(
-      {{"name", name},
-       {"samplers", {{{"input", file.addFloats(times, "SCALAR")}, {"output", values}}}},
-       {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
-}
-
-std::string write(const FileBuilder& file, const std::string& name) {
-  const std::string path = outFile(name);
-  std::ofstream(path) << file.text();
-  return path;
-}
-
 TEST(VerificationTest, ClipsAreVerifiedAsScenesPlayThem) {
-  FileBuilder file = skinnedTriangle();
-  file.primitive()["targets"] = {
-      {{"POSITION", file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3")}}};
-  file.json["skins"][0]["name"] = "figure";
-  addClip(file, "bend", 2, "rotation", {0, 1},
-          file.addFloats({0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4"));
-  addClip(file, "grow", 0, "weights", {0, 2}, file.addFloats({0.25f, 0.75f}, "SCALAR"));
-  const std::string model = write(file, "clips.gltf");
+  const std::string model = modelWithClips("clips.gltf");
   const std::string json = outFile("clips.json"), junit = outFile("clips.xml");
   const CommandResult result =
       dermis({"verify", model, "--device", "cpu", "--json", json, "--junit", junit});
