@@ -120,6 +120,9 @@ class GpuModelTest : public SystemTest,
       return instance.description.culledOnGpu && instance.isVisible;
     });
     if (culls) calls.push_back({[this] { return engine_->recorder().record(VK_NULL_HANDLE); }});
+    calls.push_back({[this] {
+      return engine_->recorder().record(VK_NULL_HANDLE, {nextWords().handle(), 2});
+    }});
   }
   std::vector<RefusedCall> callsBetweenFrames() override {
     return {{[this] { return engine_->recorder().record(VK_NULL_HANDLE); }},
