@@ -118,6 +118,10 @@ def vectorInstructions(path):
     return count(range(begin, end + 1)), count(outside)
 
 
+GOALS = {"dual quaternions": "at most 123, 134", "dual quaternions with scale": "at most 278; 32 waves on navi31",
+         "linear": "at most 113", "encoding": "at most 60"}
+
+
 def goals(program):
     f32 = "with positions as float32x3, normals as float32x3"
     f16 = "with positions as float16x4, normals as octahedral16x2"
@@ -133,7 +137,8 @@ def goals(program):
     for chip in sys.argv[3:] or ["navi21"]:
         with tempfile.TemporaryDirectory() as folder:
             waves = {kernel: values.get("Subgroups per SIMD") for kernel, values in compiled(program, chip, folder)}
-            print(f"{chip}: vector instructions in the loop over instances; with the rest for 4 instances; waves")
+            print(f"{chip}: vector instructions in the loop over instances; with the rest for 4 instances; waves; goals for navi21")
+            loops = {}
             for title, name in kernels:
                 path = Path(folder) / (re.sub("[ ,/]", "_", name) + ".s")
                 found = vectorInstructions(path) if path.exists() else None
@@ -142,7 +147,13 @@ def goals(program):
                     continue
                 layout = name[5:name.index(" skin kernel")]
                 kernel = name[name.index("skin kernel"):]
-                print(f"  {title:46} {found[0]:4} {found[0] + found[1] / 4:6.0f} {waves[f'{layout}; words; {kernel}']:>4}")
+                loops[title] = found[0]
+                print(f"  {title:46} {found[0]:4} {found[0] + found[1] / 4:6.0f} {waves[f'{layout}; words; {kernel}']:>4}"
+                      f"   {GOALS.get(title, '')}")
+            for method in ("dual quaternions", "linear"):
+                compact = method + ", float16x4 + octahedral16x2"
+                if method in loops and compact in loops:
+                    print(f"  {compact + ', encoding alone':46} {loops[compact] - loops[method]:4} {'':11}   {GOALS['encoding']}")
 
 
 def intel(program, shim):
