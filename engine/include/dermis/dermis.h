@@ -1500,7 +1500,8 @@ DERMIS_C_API dermis_code dermis_recorder_create(const dermis_context* context,
 // Valid until the recorder is destroyed. Null if `recorder` is null.
 DERMIS_C_API dermis_scene* dermis_recorder_scene(dermis_recorder* recorder);
 // Records the frame, outside a render pass. `visibility` is the buffer of visibility words, if
-// instances are culled on the GPU; otherwise VK_NULL_HANDLE.
+// instances are culled on the GPU; otherwise VK_NULL_HANDLE. `visibility_offset` is in bytes, a
+// multiple of the device's alignment of storage buffers.
 DERMIS_C_API dermis_code dermis_record(dermis_recorder* recorder, VkCommandBuffer command_buffer,
                                        VkBuffer visibility, VkDeviceSize visibility_offset,
                                        dermis_error* error);

@@ -292,9 +292,8 @@ class DERMIS_VULKAN_API Context {
   /// this tuning; if empty, with `tuning()`. If `PipelineNeeds::mesh` and `promise` are empty,
   /// these are the pipelines for any mesh, pose and morph targets. Once all needs are prepared,
   /// `record` never fails with `notPrepared`. May take long: call it from a loading thread. If it
-  /// fails
-  /// (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of `KernelSource::get`), the
-  /// pipelines that were built before remain.
+  /// fails (`invalidArgument`, `missingFeature`, `vulkanError`, or the error of
+  /// `KernelSource::get`), the pipelines that were built before remain.
   Result<void> prepare(const PipelineNeeds& needs, const std::optional<Tuning>& tuning = {}) const;
 
   /// Builds these pipelines. Those that exist are skipped. For jobs whose attributes are not placed

@@ -154,14 +154,13 @@ class DERMIS_VULKAN_API SceneRecorder {
                                       const SceneRecorderDescription& description = {});
 
   /// Call it before `create`, to find out what a range of the engine needs. `role` is `meshes`,
-  /// `poses`, `gpuPoses` or `output`. Returns usage and alignment, and the size
-  /// for the initial capacity in `description`. The alignment of the output need not be a power of
-  /// two.
-  /// An instance begins at a multiple of its `VertexPlaces::alignment` from the beginning of the
-  /// buffer. With the layouts of the instances, the size of the output has room for that, wherever
-  /// the range begins, if the instances of each layout are interleaved and added one after the
-  /// other. For other roles it returns the initial requirement; tables have size 0, since their
-  /// size depends on the frame. Creates nothing. Fails as `create` and `placeVertices` do.
+  /// `poses`, `gpuPoses` or `output`. Returns usage and alignment, and the size for the initial
+  /// capacity in `description`. The alignment of the output need not be a power of two. An instance
+  /// begins at a multiple of its `VertexPlaces::alignment` from the beginning of the buffer. With
+  /// the layouts of the instances, the size of the output has room for that, wherever the range
+  /// begins, if the instances of each layout are interleaved and added one after the other. For
+  /// other roles it returns the initial requirement; tables have size 0, since their size depends
+  /// on the frame. Creates nothing. Fails as `create` and `placeVertices` do.
   static Result<BufferRequirement> requirement(const Context& context,
                                                const SceneRecorderDescription& description,
                                                BufferRole role,
