@@ -5,12 +5,60 @@
 
 #include "abi.h"
 
-#define STREAM Positions
-#define STREAM_BINDING BINDING_POSITIONS
-#if defined(EXTRAS) || defined(ONE_OUTPUT)
-#define STREAM_LOADS
+// STORED(NAME, AT) declares the buffer of one attribute as words, with TEXELS as vectors too, and storeNAME, which stores the first
+// `size` bytes of `words` that are whole words, all at once if `wide`, and changes no other bytes. `place` is a byte offset; the first
+// word is the one that contains it. LOADED(NAME) declares loadNAME, which loads what is stored at `place`.
+#ifdef TEXELS
+#define WIDE_BUFFERS(NAME, AT) \
+  layout(set = 0, binding = AT, scalar) buffer Vectors2##NAME { uvec2 vectors2##NAME[]; }; \
+  layout(set = 0, binding = AT, scalar) buffer Vectors3##NAME { uvec3 vectors3##NAME[]; }; \
+  layout(set = 0, binding = AT, scalar) buffer Vectors4##NAME { uvec4 vectors4##NAME[]; };
+#define WIDE_STORE(NAME) \
+  if (wide) { \
+    if (size == 8u) vectors2##NAME[place / 8u] = words.xy; \
+    if (size == 12u) vectors3##NAME[place / 12u] = words.xyz; \
+    if (size == 16u) vectors4##NAME[place / 16u] = words; \
+    return; \
+  }
+#define WIDE_LOAD(NAME) \
+  if (wide) { \
+    if (size == 8u) words.xy = vectors2##NAME[place / 8u]; \
+    if (size == 12u) words.xyz = vectors3##NAME[place / 12u]; \
+    if (size == 16u) words = vectors4##NAME[place / 16u]; \
+    return words; \
+  }
+#else
+#define WIDE_BUFFERS(NAME, AT)
+#define WIDE_STORE(NAME)
+#define WIDE_LOAD(NAME)
 #endif
-#include "stream.glsl"
+#define STORED(NAME, AT) \
+  layout(set = 0, binding = AT, std430) buffer Words##NAME { uint words##NAME[]; }; \
+  WIDE_BUFFERS(NAME, AT) \
+  void store##NAME(uint place, uvec4 words, uint size, bool wide) { \
+    WIDE_STORE(NAME) \
+    uint word = place / 4u; \
+    if (size >= 4u) words##NAME[word] = words.x; \
+    if (size >= 8u) words##NAME[word + 1u] = words.y; \
+    if (size >= 12u) words##NAME[word + 2u] = words.z; \
+    if (size >= 16u) words##NAME[word + 3u] = words.w; \
+  }
+#define LOADED(NAME) \
+  uvec4 load##NAME(uint place, uint size, bool wide) { \
+    uvec4 words = uvec4(0u); \
+    WIDE_LOAD(NAME) \
+    uint word = place / 4u; \
+    words.x = words##NAME[word]; \
+    if (size > 4u) words.y = words##NAME[word + 1u]; \
+    if (size > 8u) words.z = words##NAME[word + 2u]; \
+    if (size > 12u) words.w = words##NAME[word + 3u]; \
+    return words; \
+  }
+
+STORED(Positions, BINDING_POSITIONS)
+#if defined(EXTRAS) || defined(ONE_OUTPUT)
+LOADED(Positions)
+#endif
 
 // Attributes that follow each other without a gap may share a word, which is stored with the second of them. Whether they do depends
 // on formats only: the attributes before it are then not whole words together.
@@ -122,18 +170,10 @@ void storePositionAndNormal(uint place, uvec3 position, uvec3 normal) {}
 #define storeTangents storePositions
 #define storePrevious storePositions
 #else
-#define STREAM Normals
-#define STREAM_BINDING BINDING_NORMALS
-#include "stream.glsl"
-
-#define STREAM Tangents
-#define STREAM_BINDING BINDING_TANGENTS
-#include "stream.glsl"
-
+STORED(Normals, BINDING_NORMALS)
+STORED(Tangents, BINDING_TANGENTS)
 #ifdef EXTRAS
-#define STREAM Previous
-#define STREAM_BINDING BINDING_PREVIOUS
-#include "stream.glsl"
+STORED(Previous, BINDING_PREVIOUS)
 #endif
 #endif
 

@@ -111,12 +111,12 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
   expectMoved(skin()[positionStream], original[positionStream]);
 
   // Another file's change does not come alone.
-  folder_->edit("polar.glsl", "#ifndef DERMIS_POLAR_GLSL",
-                "// Changed.\n#ifndef DERMIS_POLAR_GLSL");
+  folder_->edit("quaternion.glsl", "#ifndef DERMIS_QUATERNION_GLSL",
+                "// Changed.\n#ifndef DERMIS_QUATERNION_GLSL");
   EXPECT_NE(refusal().find("positron"), std::string::npos);
   folder_->edit("skin.comp", ShaderFolder::brokenPosition, ShaderFolder::storedPosition);
   const KernelReload mended = reload();
-  EXPECT_TRUE(namesOnly(mended.replaced, "skin")) << "a comment in polar.glsl changes no word";
+  EXPECT_TRUE(namesOnly(mended.replaced, "skin")) << "a comment in quaternion.glsl changes no word";
   EXPECT_GT(mended.changed, mended.replaced.size());
   EXPECT_EQ(skin(), original);
 }
@@ -132,9 +132,9 @@ TEST_F(KernelReloadTest, AFileThatIsMissingForAWhileOrOfAnotherVersionIsNotUsed)
   const PipelineId palette = helper(Kernel::palette);
   must(context_->prepare({&palette, 1}));
   static_cast<void>(reload());
-  std::filesystem::rename(folder_->path() / "polar.glsl", folder_->path() / "polar");
-  EXPECT_NE(refusal().find("polar.glsl"), std::string::npos);
-  std::filesystem::rename(folder_->path() / "polar", folder_->path() / "polar.glsl");
+  std::filesystem::rename(folder_->path() / "quaternion.glsl", folder_->path() / "quaternion");
+  EXPECT_NE(refusal().find("quaternion.glsl"), std::string::npos);
+  std::filesystem::rename(folder_->path() / "quaternion", folder_->path() / "quaternion.glsl");
   EXPECT_EQ(reload().changed, 1u);
   folder_->edit("abi.h", "BINDING_TABLES = 0u", "BINDING_TABLES = 7u");
   EXPECT_NE(refusal().find("abi.h"), std::string::npos);

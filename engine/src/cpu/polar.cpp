@@ -10,7 +10,7 @@ namespace dermis::cpu {
 namespace {
 
 // In double precision, no residual with compensated sums is needed, unlike in the palette kernel
-// (shaders/polar.glsl), and no driver can replace operations.
+// (shaders/palette.comp), and no driver can replace operations.
 using Vector = std::array<double, 4>;
 using Matrix = std::array<std::array<double, 4>, 4>;
 
