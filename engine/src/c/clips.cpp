@@ -1,11 +1,10 @@
 // Banks of clips, and figures.
-#include "clips.h"
-
 #include <algorithm>
 #include <deque>
 #include <optional>
 
 #include "convert.h"
+#include "sources.h"
 
 using namespace dermis;
 using namespace dermis::c;
@@ -29,165 +28,31 @@ struct dermis_bank : Object {
   std::vector<std::uint32_t> morphedNodes, weightCounts;
 };
 
-namespace {
-
-bool isZero(std::span<const double> numbers) {
-  return std::ranges::all_of(numbers, [](double number) { return number == 0; });
-}
-
-SkeletonNode nodeOf(const dermis_node& node) {
-  SkeletonNode result;
-  result.name = text(node.name);
-  if (node.parent != 0) result.parent = node.parent - 1;
-  std::copy_n(node.translation, 3, result.translation.begin());
-  if (!isZero(node.rotation)) std::copy_n(node.rotation, 4, result.rotation.begin());
-  if (!isZero(node.scale)) std::copy_n(node.scale, 3, result.scale.begin());
-  result.weights = array(node.weights, node.weight_count, "a node's weights");
-  if (node.matrix == nullptr) return result;
-  Transform& matrix = result.matrix.emplace();
-  for (std::size_t i = 0; i < 12; ++i) matrix[i / 4][i % 4] = node.matrix[i];
-  return result;
-}
-
-ChannelView channelOf(const dermis_channel& channel) {
-  ChannelView result;
-  result.node = channel.node;
-  result.path = static_cast<ChannelPath>(
-      enumerator(channel.path, DERMIS_CHANNEL_WEIGHTS, "a channel's path"));
-  result.interpolation = static_cast<Interpolation>(enumerator(
-      channel.interpolation, DERMIS_INTERPOLATION_CUBIC_SPLINE, "a channel's interpolation"));
-  result.times = array(channel.times, channel.key_count, "a channel's times");
-  result.values = array(channel.values, channel.value_count, "a channel's values");
-  return result;
-}
-
-ClipView clipOf(const dermis_clip_view& clip) {
-  ClipView result;
-  result.name = text(clip.name);
-  result.duration = clip.duration;
-  for (const dermis_channel& channel : inArray(clip.channels, clip.channel_count, "channels"))
-    result.channels.push_back(channelOf(channel));
-  result.wraps = clip.is_clamped == 0;
-  result.additive = clip.is_additive != 0;
-  if (clip.base_clip != 0) result.baseClip = clip.base_clip - 1;
-  result.baseTime = clip.base_time;
-  return result;
-}
-
-/// Views of what the caller has.
-struct Source {
-  explicit Source(const dermis_clips_source* callers) {
-    const dermis_clips_source source = in(callers, "source");
-    for (const dermis_node& node : inArray(source.nodes, source.node_count, "nodes"))
-      skeleton.nodes.push_back(nodeOf(node));
-    for (const dermis_skin& skin : inArray(source.skins, source.skin_count, "skins")) {
-      skeleton.skins.push_back(
-          {text(skin.name), array(skin.joints, skin.joint_count, "a skin's joints"),
-           jointsOf(skin.inverse_bind, skin.joint_count, "a skin's inverse_bind")});
-    }
-    for (const dermis_clip_view& clip : inArray(source.clips, source.clip_count, "clips"))
-      clips.push_back(clipOf(clip));
-    const std::size_t nodes = source.node_count;
-    if (source.mask_count > maxMasks)
-      fail("there are " + std::to_string(source.mask_count) + " masks, but at most " +
-               std::to_string(maxMasks) + " are allowed",
-           DERMIS_LIMIT_EXCEEDED);
-    const std::span<const float> all = array(source.masks, source.mask_count * nodes, "masks");
-    for (std::size_t mask = 0; mask < source.mask_count; ++mask)
-      masks.push_back(all.subspan(mask * nodes, nodes));
-    options.masks = masks;
-    options.maxError = source.max_error;
-    options.maxWeightError = source.max_weight_error;
-    if (source.root_motion_node != 0) {
-      options.rootMotion = {.node = source.root_motion_node - 1,
-                            .upAxis = source.up_axis == 0 ? 1 : source.up_axis - 1};
-    }
-    if (source.meshes == nullptr) return;
-    for (const dermis_mesh_view& mesh : inArray(source.meshes, source.skin_count, "meshes")) {
-      const std::size_t joints = skeleton.skins[bounds.size()].joints.size();
-      bounds.push_back(must(jointBounds(View(&mesh).mesh, static_cast<std::uint32_t>(joints))));
-    }
-    for (const JointBounds& of : bounds) meshes.push_back(&of);
-    options.meshes = meshes;
-  }
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
-
-  Skeleton skeleton;
-  std::vector<ClipView> clips;
-  std::vector<std::span<const float>> masks;
-  std::deque<JointBounds> bounds;
-  std::vector<const JointBounds*> meshes;
-  PackClipsOptions options;
-};
-
-void appendLayers(std::span<const dermis_clip_layer> layers, std::vector<ClipLayer>& to) {
-  for (const dermis_clip_layer& layer : layers)
-    to.push_back({layer.clip, layer.time, layer.weight, layer.mask, layer.hold != 0});
-}
-
-}  // namespace
-
-namespace dermis::c {
-
-ClipsForCaller::ClipsForCaller(const Skeleton& skeleton, std::span<const ClipView> views) {
-  for (const SkeletonNode& node : skeleton.nodes) {
-    dermis_node& result = nodes_.emplace_back();
-    result.size = sizeof(result);
-    if (node.parent < skeleton.nodes.size()) result.parent = node.parent + 1;
-    result.name = names_.emplace_back(node.name).c_str();
-    std::ranges::copy(node.translation, result.translation);
-    std::ranges::copy(node.rotation, result.rotation);
-    std::ranges::copy(node.scale, result.scale);
-    if (isZero(result.scale)) result.scale[0] = 1e-300;  // 0 in float32, and not the default
-    result.weights = node.weights.data();
-    result.weight_count = static_cast<std::uint32_t>(node.weights.size());
-    if (!node.matrix) continue;
-    std::array<double, 12>& matrix = matrices_.emplace_back();
-    for (std::size_t i = 0; i < 12; ++i) matrix[i] = (*node.matrix)[i / 4][i % 4];
-    result.matrix = matrix.data();
-  }
-  for (const SkeletonSkin& skin : skeleton.skins) {
-    skins_.push_back({sizeof(dermis_skin), static_cast<std::uint32_t>(skin.joints.size()),
-                      names_.emplace_back(skin.name).c_str(), skin.joints.data(),
-                      reinterpret_cast<const dermis_joint*>(skin.inverseBind.data())});
-  }
-  for (const ClipView& clip : views) {
-    std::vector<dermis_channel>& channels = channels_.emplace_back();
-    for (const ChannelView& channel : clip.channels) {
-      channels.push_back(
-          {sizeof(dermis_channel), channel.node, static_cast<dermis_channel_path>(channel.path),
-           static_cast<dermis_interpolation>(channel.interpolation), channel.times.data(),
-           channel.values.data(), static_cast<std::uint32_t>(channel.times.size()),
-           static_cast<std::uint32_t>(channel.values.size())});
-    }
-    dermis_clip_view& result = clips_.emplace_back();
-    result.size = sizeof(result);
-    result.channel_count = static_cast<std::uint32_t>(channels.size());
-    result.name = names_.emplace_back(clip.name).c_str();
-    result.duration = clip.duration;
-    result.channels = channels.data();
-  }
-  source.size = sizeof(source);
-  source.node_count = static_cast<std::uint32_t>(nodes_.size());
-  source.skin_count = static_cast<std::uint32_t>(skins_.size());
-  source.clip_count = static_cast<std::uint32_t>(clips_.size());
-  source.nodes = nodes_.data();
-  source.skins = skins_.data();
-  source.clips = clips_.data();
-}
-
-}  // namespace dermis::c
-
 extern "C" {
 
 dermis_code dermis_pack_clips(const dermis_clips_source* callers, dermis_bank** bank,
                               dermis_error* error) {
   return guarded(error, [&] {
-    const Source source(callers);
+    const dermis_clips_source given = in(callers, "source");
+    const ClipsOfCaller source(given);
+    PackClipsOptions options;
+    options.maxError = given.max_error;
+    options.masks = source.masks;
+    options.maxWeightError = given.max_weight_error;
+    options.rootMotion = source.rootMotion;
+    std::deque<JointBounds> bounds;
+    std::vector<const JointBounds*> meshes;
+    if (given.meshes != nullptr) {
+      for (const dermis_mesh_view& mesh : inArray(given.meshes, given.skin_count, "meshes")) {
+        const std::size_t joints = source.skeleton.skins[bounds.size()].joints.size();
+        bounds.push_back(must(jointBounds(View(&mesh).mesh, static_cast<std::uint32_t>(joints))));
+        meshes.push_back(&bounds.back());
+      }
+      options.meshes = meshes;
+    }
     dermis_bank*& result = required(bank, "bank");
     PackClipsReport report;
-    PackedClips clips = must(packClips(source.skeleton, source.clips, source.options, &report));
+    PackedClips clips = must(packClips(source.skeleton, source.clips, options, &report));
     result = new dermis_bank(std::move(clips), std::move(report));
   });
 }

@@ -3,9 +3,9 @@
 #include <deque>
 #include <optional>
 
-#include "clips.h"
 #include "convert.h"
 #include "dermis/gltf.h"
+#include "sources.h"
 
 using namespace dermis;
 using namespace dermis::c;
