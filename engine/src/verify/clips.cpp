@@ -588,6 +588,13 @@ Result<std::vector<Layer>> toLayers(const Skeleton& skeleton, std::span<const Cl
   return resolved;
 }
 
+std::vector<std::uint32_t> parentsOf(const Skeleton& skeleton) {
+  std::vector<std::uint32_t> parents;
+  for (const SkeletonNode& node : skeleton.nodes)
+    parents.push_back(node.parent < skeleton.nodes.size() ? node.parent : noJoint);
+  return parents;
+}
+
 }  // namespace
 
 Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipView> clips,
@@ -597,9 +604,7 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
   if (const Result<void> checked = checkSkin(skeleton, skin); !checked) return checked.error();
   const Result<std::vector<Layer>> resolved = toLayers(skeleton, clips, masks, layers);
   if (!resolved) return resolved.error();
-  std::vector<std::uint32_t> parents;
-  for (const SkeletonNode& node : skeleton.nodes)
-    parents.push_back(node.parent < skeleton.nodes.size() ? node.parent : noJoint);
+  const std::vector<std::uint32_t> parents = parentsOf(skeleton);
   const std::vector<std::uint32_t> order = diagnosis::orderOf(parents);
   if (order.size() != parents.size()) return refused("the parents of nodes form a cycle");
 
@@ -642,6 +647,8 @@ Result<SampledMotion> rootMotion(const Skeleton& skeleton, std::span<const ClipV
   if (const Result<void> checked = checkClips(skeleton, clips); !checked) return checked.error();
   if (options.node >= skeleton.nodes.size() || options.upAxis > 2)
     return refused("root motion names a node or an axis that does not exist");
+  if (diagnosis::orderOf(parentsOf(skeleton)).size() != skeleton.nodes.size())
+    return refused("the parents of nodes form a cycle");
   if (clip >= clips.size()) return refused("clip " + std::to_string(clip) + " does not exist");
   if (!std::isfinite(fromSeconds) || !std::isfinite(toSeconds))
     return refused("a time is not finite");
