@@ -11,7 +11,9 @@
 
 #include "c_helpers.h"
 #include "dermis/clips.h"
+#include "dermis/dermis_compare.h"
 #include "dermis/gltf.h"
+#include "dermis/verify.h"
 #include "test_paths.h"
 
 namespace dermis::test {
@@ -42,6 +44,8 @@ class CClipsTest : public ::testing::Test {
     EXPECT_EQ(info.slowest_rate, report.slowestRate);
     EXPECT_EQ(info.fastest_rate, report.fastestRate);
     EXPECT_EQ(info.key_count, report.keyCount);
+    EXPECT_EQ(info.animated_tracks, report.animatedTracks);
+    EXPECT_EQ(info.constant_tracks, report.constantTracks);
     EXPECT_EQ(info.worst, report.worst);
     return same;
   }
@@ -49,6 +53,30 @@ class CClipsTest : public ::testing::Test {
     Owned<dermis_bank> none;
     expectError(dermis_pack_clips(&source, &none, &error), part);
     EXPECT_EQ(none.object, nullptr);
+  }
+
+  /// What the reference samples of the source, with bounds of the bank.
+  dermis_sampled_clips sampledOf(const dermis_bank* bank,
+                                 std::span<const dermis_clip_layer> layers) {
+    dermis_bank_info info = sized<dermis_bank_info>();
+    expectOk(dermis_bank_contents(bank, &info, &error));
+    dermis_sampled_clips sampled = sized<dermis_sampled_clips>();
+    sampled.source = &source;
+    sampled.layers = layers.data();
+    sampled.layer_count = static_cast<std::uint32_t>(layers.size());
+    sampled.bank = info.bytes;
+    sampled.bank_byte_count = info.byte_count;
+    return sampled;
+  }
+  /// The pose that the reference samples is that of C++.
+  static void expectPose(const dermis_sampled_clips& sampled,
+                         const reference::SampledPose& expected) {
+    std::vector<double> joints(12 * expected.joints.size()), bounds(2 * expected.joints.size());
+    expectOk(dermis_reference_pose(&sampled, 0, joints.data(), joints.size(), bounds.data(),
+                                   bounds.size(), &error));
+    EXPECT_TRUE(isSame(joints.data(), expected.joints.data(), 8 * joints.size()));
+    EXPECT_TRUE(isSame(bounds.data(), expected.bounds.data(), 8 * bounds.size()));
+    EXPECT_GT(bounds[0], 0);
   }
 
   Owned<dermis_model> model;
@@ -131,6 +159,8 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
   expectOk(
       dermis_sample_pose(bank, layers.data(), 2, 0, joints.data(), primitive.joint_count, &error));
   EXPECT_TRUE(isSame(joints.data(), pose.data(), sizeof(JointMatrix) * pose.size()));
+  expectPose(sampledOf(bank, layers),
+             must(reference::samplePose(skeleton, clips, spans, sameLayers, 0, &same)));
   expectError(
       dermis_sample_pose(bank, layers.data(), 2, 1, joints.data(), primitive.joint_count, &error),
       "there is no skin 1");
@@ -149,6 +179,105 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
   odd->size += 4;
   source.meshes = odd;
   refuses("meshes: its size is", DERMIS_INVALID_ARGUMENT);
+}
+
+TEST_F(CClipsTest, ErrorsAndTimesAreThoseOfCpp) {
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank);
+  float largest = 0;
+  for (std::uint32_t node = 0; node <= skeleton.nodes.size(); ++node) {
+    dermis_clip_error found{9, 9, 9, 9};
+    expectOk(dermis_node_error(bank, node, &found, &error));
+    const ClipError wanted = same.error(node);
+    EXPECT_TRUE(isSame(&found, &wanted, sizeof(found)));
+    largest = std::max(largest, found.rotation);
+  }
+  EXPECT_GT(largest, 0);
+  expectError(dermis_node_error(nullptr, 0, nullptr, &error), "bank is null");
+  expectError(dermis_node_error(bank, 0, nullptr, &error), "result is null");
+
+  float time = 0;
+  for (const double seconds : {-0.25, 0.5, 100.0}) {
+    for (const bool hold : {false, true}) {
+      expectOk(dermis_clip_time(bank, 1, seconds, hold ? 1 : 0, &time, &error));
+      EXPECT_EQ(time, clipTime(same.clip(1), seconds, hold));
+    }
+  }
+  expectError(dermis_clip_time(nullptr, 0, 0, 0, &time, &error), "bank is null");
+  expectError(dermis_clip_time(bank, 7, 0, 0, &time, &error), "there is no clip 7");
+  expectError(dermis_clip_time(bank, 0, 0, 0, nullptr, &error), "result is null");
+  expectError(dermis_clip_time(bank, 0, std::numeric_limits<double>::infinity(), 0, &time, &error),
+              "the time is not finite");
+}
+
+TEST_F(CClipsTest, WhatIsWrongForTheReferenceIsSaid) {
+  Owned<dermis_bank> bank;
+  const PackedClips same = pack(bank);
+  const dermis_clip_layer layer{0.5, 1, 0, 0, 0};
+  const dermis_sampled_clips right = sampledOf(bank, {&layer, 1});
+  const dermis_clips_source callers = source;
+  dermis_sampled_clips sampled = right;
+  const std::size_t count = same.jointCount(0);
+  std::vector<double> joints(12 * count, 7), bounds(2 * count, 7);
+  const auto refused = [&](const std::string& part, dermis_code code = DERMIS_INVALID_ARGUMENT) {
+    expectError(dermis_reference_pose(&sampled, 0, joints.data(), 12 * count, bounds.data(),
+                                      2 * count, &error),
+                part, code);
+    EXPECT_EQ(joints[0], 7);
+    EXPECT_EQ(bounds[0], 7);
+    sampled = right;
+  };
+  sampled.size = 8;
+  refused("sampled: its size is 8");
+  sampled.source = nullptr;
+  refused("source is null");
+  source.size = 8;
+  refused("source: its size is 8");
+  source.size = sizeof(source);
+  sampled.layers = nullptr;
+  refused("layers is null");
+  sampled.layer_count = 5;
+  const std::array<dermis_clip_layer, 5> many{};
+  sampled.layers = many.data();
+  refused("there are 5 layers, but at most 4");
+  sampled.bank = nullptr;
+  refused("bank is null");
+  sampled.bank = nullptr;
+  sampled.bank_byte_count = 0;
+  refused("there is no bank, from which bounds follow");
+  sampled.bank_byte_count -= 4;
+  refused("", DERMIS_INVALID_DATA);
+  expectError(dermis_reference_pose(nullptr, 0, nullptr, 0, nullptr, 0, &error), "sampled is null");
+  expectError(dermis_reference_pose(&sampled, 1, nullptr, 0, nullptr, 0, &error),
+              "skin 1 does not exist");
+  expectError(
+      dermis_reference_pose(&sampled, 0, joints.data(), 12 * count, bounds.data(), 1, &error),
+      "bounds have " + std::to_string(2 * count) + " numbers, not 1");
+  EXPECT_EQ(joints[0], 7);  // nothing is written if a count is wrong
+  expectError(dermis_reference_weights(nullptr, 0, nullptr, 0, nullptr, 0, &error),
+              "sampled is null");
+  expectError(dermis_reference_weights(&sampled, 0, joints.data(), 4, nullptr, 0, &error),
+              "weights have 0 numbers, not 4");
+  double motion[4] = {7};
+  expectError(dermis_reference_motion(nullptr, 0, 0, 1, 0, motion, nullptr, &error),
+              "sampled is null");
+  expectError(dermis_reference_motion(&sampled, 0, 0, 1, 0, motion, nullptr, &error),
+              "the source has no root_motion_node");
+  EXPECT_EQ(motion[0], 7);
+  std::vector<dermis_node> nodes(source.nodes, source.nodes + source.node_count);
+  nodes[0].parent = 1;
+  source.nodes = nodes.data();
+  refused("the parents of nodes form a cycle");
+  source.root_motion_node = 1;
+  expectError(dermis_reference_motion(&sampled, 0, 0, 1, 0, motion, nullptr, &error),
+              "the parents of nodes form a cycle");
+  source = callers;
+  // Without a bank and arrays, what is given is checked.
+  sampled.bank = nullptr;
+  sampled.bank_byte_count = 0;
+  expectOk(dermis_reference_pose(&sampled, 0, nullptr, 0, nullptr, 0, &error));
+  expectOk(dermis_reference_pose(&sampled, 0, joints.data(), 12 * count, nullptr, 0, &error));
+  EXPECT_NE(joints[0], 7);
 }
 
 TEST_F(CClipsTest, BoxesAreThoseOfCpp) {
@@ -237,6 +366,15 @@ TEST_F(CClipsTest, WeightsAreThoseOfCpp) {
   must(sampleWeights(same, {&sameLayer, 1}, 1, expectedWeights));
   EXPECT_EQ(weights, expectedWeights);
   EXPECT_NE(weights, rest);
+  const dermis_sampled_clips sampled = sampledOf(bank, {&layer, 1});
+  const auto exact = must(reference::sampleWeights(skeleton, clips, {}, {&sameLayer, 1}, 1, &same));
+  std::vector<double> exactWeights(4), bounds(4);
+  expectOk(dermis_reference_weights(&sampled, 1, exactWeights.data(), 4, bounds.data(), 4, &error));
+  EXPECT_EQ(exactWeights, exact.weights);
+  EXPECT_EQ(bounds, exact.bounds);
+  dermis_clip_error of{};
+  expectOk(dermis_node_error(bank, 1, &of, &error));
+  EXPECT_EQ(of.weight, same.error(1).weight);
   // A loaded bank knows how many a node has.
   dermis_bank_info info = sized<dermis_bank_info>();
   Owned<dermis_bank> loaded;
@@ -275,13 +413,19 @@ TEST_F(CClipsTest, RootMotionIsThatOfCpp) {
   for (std::uint32_t up = 0; up < 4; ++up) {
     source.root_motion_node = channel.node + 1;
     source.up_axis = up;
+    const RootMotionOptions carrier{.node = channel.node, .upAxis = up == 0 ? 1 : up - 1};
     Owned<dermis_bank> bank;
-    const PackedClips same = pack(
-        bank,
-        {.rootMotion = RootMotionOptions{.node = channel.node, .upAxis = up == 0 ? 1 : up - 1}});
+    const PackedClips same = pack(bank, {.rootMotion = carrier});
     dermis_bank_info info = sized<dermis_bank_info>();
     expectOk(dermis_bank_contents(bank, &info, &error));
     EXPECT_EQ(info.has_root_motion, 1u);
+    const ClipError wanted = same.rootMotionError();
+    EXPECT_TRUE(isSame(&info.root_motion_error, &wanted, sizeof(wanted)));
+    const dermis_clip_layer layer{0.7, 1, 0, 0, 0};
+    const ClipLayer sameLayer{0, 0.7};
+    const dermis_sampled_clips sampled = sampledOf(bank, {&layer, 1});
+    expectPose(sampled, must(reference::samplePose(skeleton, clips, {}, {&sameLayer, 1}, 0, &same,
+                                                   &carrier)));
     for (const bool hold : {false, true}) {
       std::array<double, 3> displacement{};
       double turn = -1;
@@ -290,7 +434,19 @@ TEST_F(CClipsTest, RootMotionIsThatOfCpp) {
       EXPECT_EQ(displacement, motion.displacement);
       EXPECT_EQ(turn, motion.turn);
       EXPECT_NEAR(displacement[2], up == 3 ? 0 : hold ? 2 : 8, 0.01);
+      const auto exact =
+          must(reference::rootMotion(skeleton, clips, carrier, 0, 1, 5, hold, &same));
+      std::array<double, 4> of{};
+      std::array<double, 2> bounds{};
+      expectOk(dermis_reference_motion(&sampled, 0, 1, 5, hold ? 1 : 0, of.data(), bounds.data(),
+                                       &error));
+      EXPECT_TRUE(isSame(of.data(), exact.motion.displacement.data(), 24));
+      EXPECT_EQ(of[3], exact.motion.turn);
+      EXPECT_EQ(bounds, (std::array{exact.displacementBound, exact.turnBound}));
+      expectOk(dermis_reference_motion(&sampled, 0, 1, 5, 0, nullptr, nullptr, &error));
     }
+    expectError(dermis_reference_motion(&sampled, 1, 0, 1, 0, nullptr, nullptr, &error),
+                "clip 1 does not exist");
     double turn = 0;
     expectError(dermis_root_motion(bank, 1, 0, 1, 0, &turn, &turn, &error), "there is no clip 1");
     expectError(dermis_root_motion(bank, 0, 0, 1, 0, nullptr, &turn, &error),

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "c_helpers.h"
+#include "dermis/dermis_compare.h"
 #include "dermis/rig.h"
+#include "dermis/verify.h"
 
 namespace dermis::test {
 namespace {
@@ -70,8 +72,9 @@ class CRigsTest : public ::testing::Test {
     source.linears = &linear;
     source.twist_count = source.corrective_count = source.chain_count = source.linear_count = 1;
   }
-  /// That of C++.
-  PackedRig packSame() const {
+  /// Calls a function with that of C++.
+  template <typename Function>
+  auto withSame(const Function& use) const {
     const TwistDriver sameTwist{.joint = 4, .source = 2, .axis = {1, 0.25f, 0}, .share = -0.75f};
     std::array<std::array<float, 4>, 4> examples{};
     std::memcpy(examples.data(), rotations.data(), sizeof(rotations));
@@ -87,15 +90,15 @@ class CRigsTest : public ::testing::Test {
                                           .joints = {&offsetJoint, 1},
                                           .offsets = sameOffsets};
     const LinearDriver sameLinear{.joint = 9, .weights = terms, .matrices = sameMatrices};
-    return must(packRig({.joints = joints,
-                         .writtenJoints = written,
-                         .givenWeights = 1,
-                         .drivenWeights = 2,
-                         .weightsOf = 5,
-                         .twists = {&sameTwist, 1},
-                         .correctives = {&sameCorrective, 1},
-                         .chains = {&sameChain, 1},
-                         .linears = {&sameLinear, 1}}));
+    return must(use(RigView{.joints = joints,
+                            .writtenJoints = written,
+                            .givenWeights = 1,
+                            .drivenWeights = 2,
+                            .weightsOf = 5,
+                            .twists = {&sameTwist, 1},
+                            .correctives = {&sameCorrective, 1},
+                            .chains = {&sameChain, 1},
+                            .linears = {&sameLinear, 1}}));
   }
   dermis_packed_rig_info pack(Owned<dermis_packed_rig>& rig) {
     expectOk(dermis_pack_rig(&source, &rig, &error));
@@ -132,7 +135,7 @@ class CRigsTest : public ::testing::Test {
 };
 
 TEST_F(CRigsTest, ARigIsThatOfCpp) {
-  const PackedRig same = packSame();
+  const PackedRig same = withSame([](const RigView& view) { return packRig(view); });
   Owned<dermis_packed_rig> rig, loaded;
   const dermis_packed_rig_info info = pack(rig);
   ASSERT_EQ(info.byte_count, same.bytes().size());
@@ -194,6 +197,51 @@ TEST_F(CRigsTest, ARigIsThatOfCpp) {
   expectError(dermis_packed_rig_load(info.bytes, info.byte_count - 4, &none, &error), "",
               DERMIS_INVALID_DATA);
   EXPECT_EQ(none.object, nullptr);
+}
+
+TEST_F(CRigsTest, TheReferenceIsThatOfCpp) {
+  std::array<JointMatrix, written> pose{};
+  for (std::uint32_t i = 0; i < written; ++i) pose[i].m[1][2] = 0.25f * static_cast<float>(i);
+  const float given = 0.375f;
+  const auto same = withSame([&](const RigView& view) {
+    return reference::evaluateRig(view, pose, {&given, 1});
+  });
+  constexpr std::size_t numbers = 12 * driven;
+  std::vector<double> exact(numbers, 7), bounds(numbers, 7), allWeights(3, 7), weightBounds(3, 7);
+  const auto evaluate = [&](std::uint32_t count, std::size_t jointNumbers,
+                            std::size_t weightCount) {
+    return dermis_reference_rig(&source, reinterpret_cast<const dermis_joint*>(pose.data()), count,
+                                &given, 1, exact.data(), bounds.data(), jointNumbers,
+                                allWeights.data(), weightBounds.data(), weightCount, &error);
+  };
+  // Refused calls write nothing.
+  expectError(evaluate(3, numbers, 3), "there are 3 joints and 1 weights, but the rig has 4 and 1");
+  expectError(evaluate(written, numbers - 1, 3), "joints have 72 numbers, not 71");
+  expectError(evaluate(written, numbers, 2), "weights have 3 numbers, not 2");
+  expectError(dermis_reference_rig(nullptr, nullptr, 0, nullptr, 0, nullptr, nullptr, 0, nullptr,
+                                   nullptr, 0, &error),
+              "source is null");
+  expectError(dermis_reference_rig(&source, nullptr, written, &given, 1, nullptr, nullptr, 0,
+                                   nullptr, nullptr, 0, &error),
+              "written is null");
+  expectError(
+      dermis_reference_rig(&source, reinterpret_cast<const dermis_joint*>(pose.data()), written,
+                           nullptr, 1, nullptr, nullptr, 0, nullptr, nullptr, 0, &error),
+      "given_weights is null");
+  twist.size = 4;
+  expectError(evaluate(written, numbers, 3), "twists[0]: its size is 4");
+  twist.size = sizeof(twist);
+  EXPECT_EQ(exact, std::vector<double>(numbers, 7));
+  EXPECT_EQ(weightBounds, std::vector<double>(3, 7));
+
+  expectOk(evaluate(written, numbers, 3));
+  EXPECT_TRUE(isSame(exact.data(), same.joints.data(), 8 * numbers));
+  EXPECT_TRUE(isSame(bounds.data(), same.jointBounds.data(), 8 * numbers));
+  EXPECT_EQ(allWeights, same.weights);
+  EXPECT_EQ(weightBounds, same.weightBounds);
+  expectOk(dermis_reference_rig(&source, reinterpret_cast<const dermis_joint*>(pose.data()),
+                                written, &given, 1, nullptr, nullptr, 0, nullptr, nullptr, 0,
+                                &error));
 }
 
 TEST_F(CRigsTest, WithoutGivenWeightsNoNodeHasThem) {

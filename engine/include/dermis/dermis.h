@@ -1130,6 +1130,13 @@ typedef struct dermis_clip_info {
   float duration;  // seconds
   uint32_t is_clamped, is_additive;
 } dermis_clip_info;
+// How far a bank may be from its clips at any time (clips.h, `ClipError`).
+typedef struct dermis_clip_error {
+  float translation;  // distance
+  float rotation;     // radians
+  float scale;        // of each factor
+  float weight;       // of each morph weight
+} dermis_clip_error;
 // What is known of a bank. Pointers are valid as long as it.
 typedef struct dermis_bank_info {
   uint32_t size;
@@ -1143,8 +1150,10 @@ typedef struct dermis_bank_info {
   double worst_error, max_error;      // of whole poses, and what was asked for
   double slowest_rate, fastest_rate;  // keys a second of tracks with keys
   uint64_t key_count;
-  const char* worst;         // where the error is: clip, node and time
-  uint32_t has_root_motion;  // whether it was taken out of the clips
+  uint32_t animated_tracks, constant_tracks;  // with keys, and with one value
+  const char* worst;                          // where the error is: clip, node and time
+  uint32_t has_root_motion;                   // whether it was taken out of the clips
+  dermis_clip_error root_motion_error;        // of the motion from a clip's beginning
   // The nodes of the skeleton with morph weights, and how many each has.
   uint32_t morphed_node_count;
   const uint32_t* morphed_nodes;
@@ -1153,6 +1162,10 @@ typedef struct dermis_bank_info {
 // Says what is known of a bank.
 DERMIS_C_API dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info,
                                               dermis_error* error);
+// Gets the error of the local transform of a node of the skeleton, and of its morph weights. It is
+// 0 where no clip moves it.
+DERMIS_C_API dermis_code dermis_node_error(const dermis_bank* bank, uint32_t node,
+                                           dermis_clip_error* result, dermis_error* error);
 
 // What takes part in a pose. Weights are relative; layers of additive clips are added.
 typedef struct dermis_clip_layer {
@@ -1162,6 +1175,9 @@ typedef struct dermis_clip_layer {
   uint32_t mask;  // 1 + its number in the source; 0: none
   uint32_t hold;  // whether the time is clamped, although the clip wraps
 } dermis_clip_layer;
+// Gets the time of a layer inside its clip, as it is sampled: in seconds, wrapped or clamped.
+DERMIS_C_API dermis_code dermis_clip_time(const dermis_bank* bank, uint32_t clip, double time,
+                                          uint32_t hold, float* result, dermis_error* error);
 // Samples the pose of a skin of at most 4 layers. Without layers it rests. The same bits on every
 // processor.
 DERMIS_C_API dermis_code dermis_sample_pose(const dermis_bank* bank,

@@ -1,6 +1,6 @@
-// The C interface of the reference: the library `dermis_compare`. C99. It says whether skinned
-// vertices are right, and is for tests and debug builds: it is written to be correct, not fast. The
-// rules of dermis.h hold. verify.h describes the reference and the bounds.
+// The C interface of the reference: the library `dermis_compare`. C99. It says whether vertices,
+// poses and what rigs drive are right, and is for tests and debug builds: it is written to be
+// correct, not fast. The rules of dermis.h hold. verify.h describes the reference and the bounds.
 #ifndef DERMIS_DERMIS_COMPARE_H
 #define DERMIS_DERMIS_COMPARE_H
 
@@ -78,6 +78,44 @@ typedef struct dermis_comparison {
 DERMIS_COMPARE_API dermis_code dermis_compare(const dermis_posed_mesh* posed,
                                               const dermis_skinned_view* skinned,
                                               dermis_comparison* comparison, dermis_error* error);
+
+// Layers of clips. In the four functions below, arrays of double may be null, and their counts are
+// those of the numbers.
+typedef struct dermis_sampled_clips {
+  uint32_t size;
+  uint32_t layer_count;
+  const dermis_clips_source* source;  // required; its errors and meshes are ignored
+  const dermis_clip_layer* layers;
+  const void* bank;  // the blob that was made of the source, for bounds; null: none
+  size_t bank_byte_count;
+} dermis_sampled_clips;
+// Samples the pose of a skin in double precision: 12 numbers for each joint, 3 rows of 4. `bounds`
+// gets 2 numbers A and B for each joint: that of a bank moves a point p of bind space to at most
+// A + B d from where it moves here, where d is the length of inverse bind matrix × p.
+DERMIS_COMPARE_API dermis_code dermis_reference_pose(const dermis_sampled_clips* sampled,
+                                                     uint32_t skin, double* joints,
+                                                     size_t joint_count, double* bounds,
+                                                     size_t bound_count, dermis_error* error);
+// Samples the morph weights of a node in the same way. `bounds`: how far those of a bank may be.
+DERMIS_COMPARE_API dermis_code dermis_reference_weights(const dermis_sampled_clips* sampled,
+                                                        uint32_t node, double* weights,
+                                                        size_t weight_count, double* bounds,
+                                                        size_t bound_count, dermis_error* error);
+// Computes the motion that `dermis_root_motion` gets; layers are ignored. `motion` and `bounds` get
+// 4 numbers: the displacement and the turn; and 2, how far those of a bank may be.
+DERMIS_COMPARE_API dermis_code dermis_reference_motion(const dermis_sampled_clips* sampled,
+                                                       uint32_t clip, double from, double to,
+                                                       uint32_t hold, double motion[4],
+                                                       double bounds[2], dermis_error* error);
+
+// Computes what a rig drives in double precision: 12 numbers for each driven joint, 3 rows of 4,
+// and all weights, the given ones first. Bounds have the counts of what they belong to: how far
+// each number in float32 may be, infinite if rounding decides.
+DERMIS_COMPARE_API dermis_code
+dermis_reference_rig(const dermis_rig_source* source, const dermis_joint* written,
+                     uint32_t written_count, const float* given_weights, uint32_t given_count,
+                     double* joints, double* joint_bounds, size_t joint_count, double* weights,
+                     double* weight_bounds, size_t weight_count, dermis_error* error);
 
 // Well-known mistakes of engines that compute joint matrices (verify.h, `PoseMistake`).
 typedef enum dermis_mistake {

@@ -1,5 +1,6 @@
 // Banks of clips, and figures.
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <optional>
 
@@ -8,6 +9,14 @@
 
 using namespace dermis;
 using namespace dermis::c;
+
+namespace {
+
+dermis_clip_error errorTo(const ClipError& error) {
+  return {error.translation, error.rotation, error.scale, error.weight};
+}
+
+}  // namespace
 
 struct dermis_bank : Object {
   explicit dermis_bank(PackedClips packed, PackClipsReport of = {})
@@ -85,12 +94,33 @@ dermis_code dermis_bank_contents(const dermis_bank* bank, dermis_bank_info* info
     result.slowest_rate = known.report.slowestRate;
     result.fastest_rate = known.report.fastestRate;
     result.key_count = known.report.keyCount;
+    result.animated_tracks = known.report.animatedTracks;
+    result.constant_tracks = known.report.constantTracks;
     result.worst = known.report.worst.c_str();
     result.has_root_motion = known.clips.hasRootMotion() ? 1 : 0;
+    result.root_motion_error = errorTo(known.clips.rootMotionError());
     result.morphed_node_count = static_cast<std::uint32_t>(known.morphedNodes.size());
     result.morphed_nodes = known.morphedNodes.data();
     result.weight_counts = known.weightCounts.data();
     give(info, result);
+  });
+}
+
+dermis_code dermis_node_error(const dermis_bank* bank, uint32_t node, dermis_clip_error* result,
+                              dermis_error* error) {
+  return guarded(error, [&] {
+    const ClipError found = required(bank, "bank").clips.error(node);
+    required(result, "result") = errorTo(found);
+  });
+}
+
+dermis_code dermis_clip_time(const dermis_bank* bank, uint32_t clip, double time, uint32_t hold,
+                             float* result, dermis_error* error) {
+  return guarded(error, [&] {
+    const PackedClips& clips = required(bank, "bank").clips;
+    if (clip >= clips.clipCount()) fail("there is no clip " + std::to_string(clip));
+    if (!std::isfinite(time)) fail("the time is not finite");
+    required(result, "result") = clipTime(clips.clip(clip), time, hold != 0);
   });
 }
 

@@ -2,9 +2,12 @@
 #include "dermis/dermis_compare.h"
 
 #include <algorithm>
+#include <initializer_list>
+#include <optional>
 
 #include "convert.h"
 #include "dermis/verify.h"
+#include "sources.h"
 
 using namespace dermis;
 using namespace dermis::c;
@@ -19,22 +22,49 @@ reference::SkinnedMesh skin(const dermis_posed_mesh* callers) {
                               methodOf(posed.method), morphsOf(posed.morphs, posed.morph_count)));
 }
 
-template <typename Vector>
-void checkCount(const double* to, std::size_t count, const std::vector<Vector>& from,
-                const char* name) {
-  if (to == nullptr) return;
-  const std::size_t size = from.size() * std::tuple_size_v<Vector>;
-  if (from.empty()) fail(std::string("the mesh has no ") + name);
-  if (count != size) {
-    fail(std::string(name) + " have " + std::to_string(size) + " numbers, not " +
+/// Numbers for the caller, who may not want them.
+struct Numbers {
+  template <typename Element>
+  Numbers(const std::vector<Element>& elements, double* to, std::size_t count, const char* of)
+      : numbers(reinterpret_cast<const double*>(elements.data()),
+                elements.size() * (sizeof(Element) / sizeof(double))),
+        target(to),
+        name(of) {
+    if (to == nullptr || count == numbers.size()) return;
+    fail(std::string(name) + " have " + std::to_string(numbers.size()) + " numbers, not " +
          std::to_string(count));
   }
+
+  std::span<const double> numbers;
+  double* target;
+  const char* name;
+};
+/// Writes all of them or, if a count is wrong, none.
+void giveAll(std::initializer_list<Numbers> all) {
+  for (const Numbers& of : all)
+    if (of.target != nullptr) std::ranges::copy(of.numbers, of.target);
 }
-template <typename Vector>
-void copyTo(double* to, const std::vector<Vector>& from) {
-  if (to == nullptr) return;
-  for (const Vector& vector : from) to = std::copy(vector.begin(), vector.end(), to);
-}
+
+/// Layers of clips of the caller.
+struct Sampled {
+  Sampled(const dermis_sampled_clips* callers, const double* bounds)
+      : given(in(callers, "sampled")), source(in(given.source, "source")) {
+    appendLayers(array(given.layers, given.layer_count, "layers"), layers);
+    const auto bytes =
+        array(static_cast<const std::byte*>(given.bank), given.bank_byte_count, "bank");
+    if (given.bank != nullptr) bank.emplace(must(PackedClips::fromBytes(bytes)));
+    if (bounds != nullptr && !bank) fail("there is no bank, from which bounds follow");
+  }
+  const PackedClips* bankOrNull() const { return bank ? &*bank : nullptr; }
+  const RootMotionOptions* rootMotionOrNull() const {
+    return source.rootMotion ? &*source.rootMotion : nullptr;
+  }
+
+  dermis_sampled_clips given;
+  ClipsOfCaller source;
+  std::vector<ClipLayer> layers;
+  std::optional<PackedClips> bank;
+};
 
 SkinnedAttribute attributeOf(const dermis_skinned_attribute& attribute, std::uint32_t count) {
   const auto format = static_cast<VertexFormat>(
@@ -52,12 +82,11 @@ dermis_code dermis_reference_skin(const dermis_posed_mesh* posed, double* positi
                                   double* tangents, size_t tangent_count, dermis_error* error) {
   return guarded(error, [&] {
     const reference::SkinnedMesh skinned = skin(posed);
-    checkCount(positions, position_count, skinned.positions, "positions");
-    checkCount(normals, normal_count, skinned.normals, "normals");
-    checkCount(tangents, tangent_count, skinned.tangents, "tangents");
-    copyTo(positions, skinned.positions);
-    copyTo(normals, skinned.normals);
-    copyTo(tangents, skinned.tangents);
+    if (normals != nullptr && skinned.normals.empty()) fail("the mesh has no normals");
+    if (tangents != nullptr && skinned.tangents.empty()) fail("the mesh has no tangents");
+    giveAll({{skinned.positions, positions, position_count, "positions"},
+             {skinned.normals, normals, normal_count, "normals"},
+             {skinned.tangents, tangents, tangent_count, "tangents"}});
   });
 }
 
@@ -88,6 +117,69 @@ dermis_code dermis_compare(const dermis_posed_mesh* posed, const dermis_skinned_
     result.worst_position_vertex = found.worstPositionVertex;
     result.first_failure = found.firstFailure;
     give(comparison, result);
+  });
+}
+
+dermis_code dermis_reference_pose(const dermis_sampled_clips* sampled, uint32_t skin,
+                                  double* joints, size_t joint_count, double* bounds,
+                                  size_t bound_count, dermis_error* error) {
+  return guarded(error, [&] {
+    const Sampled from(sampled, bounds);
+    const reference::SampledPose pose =
+        must(reference::samplePose(from.source.skeleton, from.source.clips, from.source.masks,
+                                   from.layers, skin, from.bankOrNull(), from.rootMotionOrNull()));
+    giveAll({{pose.joints, joints, joint_count, "joints"},
+             {pose.bounds, bounds, bound_count, "bounds"}});
+  });
+}
+
+dermis_code dermis_reference_weights(const dermis_sampled_clips* sampled, uint32_t node,
+                                     double* weights, size_t weight_count, double* bounds,
+                                     size_t bound_count, dermis_error* error) {
+  return guarded(error, [&] {
+    const Sampled from(sampled, bounds);
+    const reference::SampledWeights result =
+        must(reference::sampleWeights(from.source.skeleton, from.source.clips, from.source.masks,
+                                      from.layers, node, from.bankOrNull()));
+    giveAll({{result.weights, weights, weight_count, "weights"},
+             {result.bounds, bounds, bound_count, "bounds"}});
+  });
+}
+
+dermis_code dermis_reference_motion(const dermis_sampled_clips* sampled, uint32_t clip, double from,
+                                    double to, uint32_t hold, double motion[4], double bounds[2],
+                                    dermis_error* error) {
+  return guarded(error, [&] {
+    const Sampled callers(sampled, bounds);
+    const ClipsOfCaller& source = callers.source;
+    if (!source.rootMotion) fail("the source has no root_motion_node");
+    const reference::SampledMotion found =
+        must(reference::rootMotion(source.skeleton, source.clips, *source.rootMotion, clip, from,
+                                   to, hold != 0, callers.bankOrNull()));
+    if (motion != nullptr) {
+      std::ranges::copy(found.motion.displacement, motion);
+      motion[3] = found.motion.turn;
+    }
+    if (bounds == nullptr) return;
+    bounds[0] = found.displacementBound;
+    bounds[1] = found.turnBound;
+  });
+}
+
+dermis_code dermis_reference_rig(const dermis_rig_source* source, const dermis_joint* written,
+                                 uint32_t written_count, const float* given_weights,
+                                 uint32_t given_count, double* joints, double* joint_bounds,
+                                 size_t joint_count, double* weights, double* weight_bounds,
+                                 size_t weight_count, dermis_error* error) {
+  return guarded(error, [&] {
+    const RigOfCaller callers(source);
+    const reference::EvaluatedRig result =
+        must(reference::evaluateRig(callers.view, jointsOf(written, written_count, "written"),
+                                    array(given_weights, given_count, "given_weights")));
+    giveAll({{result.joints, joints, joint_count, "joints"},
+             {result.jointBounds, joint_bounds, joint_count, "joint_bounds"},
+             {result.weights, weights, weight_count, "weights"},
+             {result.weightBounds, weight_bounds, weight_count, "weight_bounds"}});
   });
 }
 
