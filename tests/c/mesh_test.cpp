@@ -132,10 +132,10 @@ TEST(CMeshTest, FindingsAndRepair) {
               DERMIS_LIMIT_EXCEEDED);
   // A number that is none of Dermis.
   const dermis_finding_callback fails = [](void*, const dermis_finding*) {
-    return static_cast<dermis_code>(-2);
+    return static_cast<dermis_code>(0xfffffffeu);
   };
   expectError(dermis_validate(&source.view, source.jointCount, fails, nullptr, &error), "callback",
-              static_cast<dermis_code>(-2));
+              static_cast<dermis_code>(0xfffffffeu));
 
   Owned<dermis_packed> packed;
   expectError(dermis_pack(&source.view, source.jointCount, &packed, &error), "a mesh of C",
