@@ -27,7 +27,7 @@ struct Numbers {
   template <typename Element>
   Numbers(const std::vector<Element>& elements, double* to, std::size_t count, const char* of)
       : numbers(reinterpret_cast<const double*>(elements.data()),
-                elements.size() * (sizeof(Element) / sizeof(double))),
+                elements.size() * sizeof(Element) / sizeof(double)),
         target(to),
         name(of) {
     if (to == nullptr || count == numbers.size()) return;
