@@ -23,6 +23,7 @@
 
 #include "dermis/clips.h"
 #include "dermis/gltf.h"
+#include "kit/bench/clip_pair.h"
 #include "kit/device.h"
 #include "kit/random_rig.h"
 #include "system_engine.h"
@@ -41,10 +42,7 @@ double processSeconds() {
 /// What a figure plays.
 std::array<ClipLayer, 2> layersOf(const PackedClips& bank, std::uint32_t figure,
                                   std::uint32_t frame) {
-  const std::uint32_t clips = bank.clipCount();
-  const double time = 0.37 * figure + frame / 60.0;
-  return {
-      {{figure % clips, time, 0.7f}, {(figure / clips + 1 + figure) % clips, 1.3 * time, 0.3f}}};
+  return samples::clipPair(bank.clipCount(), figure, frame / 60.0);
 }
 
 /// Figures with an instance each. They play clips, or have a pose that is written in each frame.

@@ -19,6 +19,7 @@
 #include "clips/bank.h"
 #include "dermis/clips.h"
 #include "dermis/gltf.h"
+#include "kit/bench/clip_pair.h"
 
 #ifdef DERMIS_BENCH_OZZ
 #include "ozz/animation/offline/animation_builder.h"
@@ -61,13 +62,8 @@ struct Subject {
     if (clips.empty()) fail("the model has no clips");
     for (std::uint32_t skin = 0; skin < bank.skinCount(); ++skin) joints += bank.jointCount(skin);
     const auto clipCount = static_cast<std::uint32_t>(clips.size());
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const float weight = 0.2f + 0.6f * static_cast<float>(i % 97) / 97;
-      const std::uint32_t second =
-          (i + 1 + i / clipCount % std::max(clipCount - 1, 1u)) % clipCount;
-      figures.push_back({{ClipLayer{.clip = i % clipCount, .time = 0.37 * i, .weight = weight},
-                          ClipLayer{.clip = second, .time = 0.23 * i, .weight = 1 - weight}}});
-    }
+    for (std::uint32_t i = 0; i < count; ++i)
+      figures.push_back({samples::clipPair(clipCount, i, 0)});
   }
 
   gltf::Model model;
