@@ -290,6 +290,7 @@ ExitStatus bench(const BenchOptions& options) {
       options.model.empty() ? samples::longFigure(figureVertices, options.instances)
                             : samples::loadCrowd(samples::pathOf(options.model), options.instances);
   if (!crowd) return reportModelError(crowd.error());
+  if (!crowd->clips) reportNote("rows of clips are left out: " + crowd->clips.error().message);
 
   ThroughputTitle title;
   title.model = crowd->name;

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -46,7 +47,8 @@ std::vector<std::string> cpuRows() {
   std::vector<std::string> rows;
   for (const std::string& threads : {std::string("1"), most}) {
     rows.push_back("cpu/linear/" + threads);
-    for (const char* const what : {"", "/tangents", "/float16x4+octahedral16x2", "/scales"})
+    for (const char* const what :
+         {"", "/tangents", "/float16x4+octahedral16x2", "/scales", "/clips"})
       rows.push_back("cpu/dual_quaternion/" + threads + what);
   }
   return rows;
@@ -93,6 +95,7 @@ TEST(BenchTest, MeasuresMethodsFormatsAndInstancesBesidePlainKernels) {
                                     "gpu/linear/float32x3",
                                     "gpu/dual_quaternion/float16x4+octahedral16x2",
                                     "gpu/dual_quaternion/float32x3/bounds",
+                                    "gpu/dual_quaternion/float32x3/clips",
                                     "gpu/dual_quaternion/float32x3/1_instance",
                                     "gpu/dual_quaternion/float32x3/10_instances",
                                     "gpu/plain/dual_quaternion",
@@ -124,7 +127,26 @@ TEST(BenchTest, MeasuresAModel) {
   ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
   EXPECT_EQ(measured.json["vertices"], 9918);
   EXPECT_EQ(measured.json["joints"], 26);
-  EXPECT_TRUE(measured.rows.contains("gpu/plain/linear"));
+  for (const char* const row :
+       {"gpu/plain/linear", "gpu/dual_quaternion/float32x3/clips", "cpu/dual_quaternion/1/clips"})
+    EXPECT_TRUE(measured.rows.contains(row)) << row;
+}
+
+TEST(BenchTest, AModelWithoutClipsHasNoRowsOfThem) {
+  std::ifstream figure(std::string(sampleModels) + "/figure.glb", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(figure)), std::istreambuf_iterator<char>());
+  const std::size_t place = bytes.find("\"animations\"");
+  ASSERT_NE(place, std::string::npos);
+  bytes[place + 1] = 'A';  // a property that glTF does not have
+  const std::string path = outFile("without_clips.glb");
+  std::ofstream(path, std::ios::binary) << bytes;
+  const Measured measured = bench({path, "--instances", "2", "--device", "cpu"});
+  ASSERT_EQ(measured.result.status, 0) << measured.result.errors;
+  EXPECT_TRUE(measured.rows.contains("cpu/dual_quaternion/1"));
+  EXPECT_FALSE(measured.rows.contains("cpu/dual_quaternion/1/clips"));
+  EXPECT_NE(measured.result.errors.find("rows of clips are left out: there are no clips"),
+            std::string::npos)
+      << measured.result.errors;
 }
 
 TEST(BenchTest, TheCpuNeedsNoVulkan) {

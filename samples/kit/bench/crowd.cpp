@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <numbers>
 #include <numeric>
 #include <random>
+#include <utility>
 
 #include "dermis/gltf.h"
 #include "kit/random_rig.h"
@@ -53,31 +55,81 @@ PlainVertex plainVertex(const gltf::Primitive& primitive, std::size_t vertex) {
   return plain;
 }
 
+AttributeView viewOf(std::span<const PlainVertex> vertices, const void* first, ComponentType type,
+                     std::uint32_t components) {
+  return {first, static_cast<std::uint32_t>(vertices.size()), sizeof(PlainVertex), type,
+          components};
+}
+
 Result<PackedMesh> packVertices(const std::vector<PlainVertex>& vertices,
                                 std::uint32_t jointCount) {
-  const auto view = [&](const void* first, ComponentType type, std::uint32_t components) {
-    return AttributeView{first, static_cast<std::uint32_t>(vertices.size()), sizeof(PlainVertex),
-                         type, components};
-  };
-  const PlainVertex& first = vertices.front();
-  const InfluenceSet influences{view(&first.joints, ComponentType::uint16, 4),
-                                view(&first.weights, ComponentType::float32, 4)};
-  MeshView mesh;
-  mesh.name = "crowd";
-  mesh.vertexCount = static_cast<std::uint32_t>(vertices.size());
-  mesh.positions = view(&first.position, ComponentType::float32, 3);
-  mesh.normals = view(&first.normal, ComponentType::float32, 3);
+  const PlainMesh plain(vertices);
+  MeshView mesh = plain.view();
   // What tangents and centers are does not affect the time of what reads them.
   std::vector<std::array<float, 4>> tangents;
   for (const PlainVertex& vertex : vertices)
     tangents.push_back({vertex.normal[1], vertex.normal[2], vertex.normal[0], 1});
   mesh.tangents = attributeView(tangents[0].data(), mesh.vertexCount, 4);
   mesh.centersOfRotation = mesh.positions;
-  mesh.influenceSets = std::span(&influences, 1);
   return pack(mesh, jointCount);
 }
 
+/// Packs two clips that turn each joint to and fro. Five limbs hang on joint 0.
+Result<PackedClips> packSwayingClips(std::uint32_t jointCount) {
+  constexpr std::uint32_t limbs = 5, keys = 33;
+  std::vector<std::uint32_t> joints(jointCount);
+  std::vector<JointMatrix> inverseBind(jointCount);
+  Skeleton skeleton;
+  for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
+    joints[joint] = joint;
+    SkeletonNode& node = skeleton.nodes.emplace_back();
+    if (joint == 0) continue;
+    node.parent = joint <= limbs ? 0 : joint - limbs;
+    node.translation = {0, 0.125, 0};
+    inverseBind[joint].m[1][3] = inverseBind[node.parent].m[1][3] - 0.125f;
+  }
+  skeleton.skins.push_back({"crowd", joints, inverseBind});
+
+  std::array<std::vector<float>, 2> times;
+  std::vector<std::vector<float>> rotations(times.size() * jointCount);
+  std::vector<ClipView> clips;
+  for (std::size_t number = 0; number < times.size(); ++number) {
+    ClipView& clip = clips.emplace_back();
+    clip.duration = number == 0 ? 1 : 1.5;
+    for (std::uint32_t key = 0; key < keys; ++key)
+      times[number].push_back(static_cast<float>(clip.duration * key / (keys - 1)));
+    for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
+      std::vector<float>& values = rotations[number * jointCount + joint];
+      for (std::uint32_t key = 0; key < keys; ++key) {
+        const double turn = 2 * std::numbers::pi * (key % (keys - 1)) / (keys - 1);
+        const double half = 0.2 * std::sin(turn + joint);
+        std::array<float, 4> rotation{0, 0, 0, static_cast<float>(std::cos(half))};
+        rotation[(joint + number) % 3] = static_cast<float>(std::sin(half));
+        values.insert(values.end(), rotation.begin(), rotation.end());
+      }
+      clip.channels.push_back(
+          {joint, ChannelPath::rotation, Interpolation::linear, times[number], values});
+    }
+  }
+  return packClips(skeleton, clips);
+}
+
 }  // namespace
+
+PlainMesh::PlainMesh(std::span<const PlainVertex> vertices)
+    : vertices_(vertices),
+      influences_{viewOf(vertices, &vertices.front().joints, ComponentType::uint16, 4),
+                  viewOf(vertices, &vertices.front().weights, ComponentType::float32, 4)} {}
+
+MeshView PlainMesh::view() const {
+  MeshView mesh;
+  mesh.name = "crowd";
+  mesh.vertexCount = static_cast<std::uint32_t>(vertices_.size());
+  mesh.positions = viewOf(vertices_, &vertices_.front().position, ComponentType::float32, 3);
+  mesh.normals = viewOf(vertices_, &vertices_.front().normal, ComponentType::float32, 3);
+  mesh.influenceSets = std::span(&influences_, 1);
+  return mesh;
+}
 
 bool Crowd::isRigid() const {
   constexpr float tolerance = 1e-3f;
@@ -138,6 +190,11 @@ Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanc
     const double phase = std::fmod(instance * step, 1.0);
     crowd.poses.push_back(gltf::pose(*model, skin, clip, phase * duration));
   }
+  if (!model->clips.empty()) {
+    Skeleton skeleton = gltf::skeleton(*model);
+    skeleton.skins = {skeleton.skins[skin]};
+    crowd.clips = packClips(skeleton, gltf::clips(*model));
+  }
   return crowd;
 }
 
@@ -172,6 +229,7 @@ Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount)
   Result<PackedMesh> packed = packVertices(crowd.vertices, jointCount);
   if (!packed) return packed.error();
   crowd.mesh.emplace(std::move(*packed));
+  crowd.clips = packSwayingClips(jointCount);
   return crowd;
 }
 

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "dermis/clips.h"
 #include "dermis/mesh.h"
 #include "dermis/result.h"
 #include "kit/batch_runner.h"
@@ -23,11 +25,28 @@ struct PlainVertex {
 };
 static_assert(sizeof(PlainVertex) == 48);
 
+/// Such vertices as a mesh. They must outlive it.
+class PlainMesh {
+ public:
+  explicit PlainMesh(std::span<const PlainVertex> vertices);
+  PlainMesh(const PlainMesh&) = delete;
+  PlainMesh& operator=(const PlainMesh&) = delete;
+
+  /// Valid while this object exists.
+  MeshView view() const;
+
+ private:
+  std::span<const PlainVertex> vertices_;
+  InfluenceSet influences_;
+};
+
 struct Crowd {
   std::string name;
   std::vector<PlainVertex> vertices;
   std::optional<PackedMesh> mesh;               ///< the same vertices
   std::vector<std::vector<JointMatrix>> poses;  ///< one per instance
+  /// A bank with one skin, that of the poses; or why there is none.
+  Result<PackedClips> clips = Error{ErrorCode::invalidData, "there are no clips"};
 
   std::uint32_t vertexCount() const { return static_cast<std::uint32_t>(vertices.size()); }
   std::uint32_t jointCount() const { return static_cast<std::uint32_t>(poses.front().size()); }
@@ -40,13 +59,13 @@ struct Crowd {
 };
 
 /// Joins all primitives that use the skin of the first one into one mesh. Makes `instanceCount`
-/// instances, each at a different time of the file's first clip. Fails if the file has no skinned
-/// primitive, or if one of the joined primitives has no normals, or does not have four influences
-/// per vertex.
+/// instances, each at a different time of the file's first clip, and packs all of its clips. Fails
+/// if the file has no skinned primitive, or if one of the joined primitives has no normals, or does
+/// not have four influences per vertex.
 Result<Crowd> loadCrowd(const std::filesystem::path& path, std::uint32_t instanceCount);
 
 /// A long figure of 60 joints with four influences per vertex. The joints of a vertex are
-/// neighbors.
+/// neighbors. The poses are random. Its two clips turn all joints.
 Result<Crowd> longFigure(std::uint32_t vertexCount, std::uint32_t instanceCount);
 
 }  // namespace dermis::samples

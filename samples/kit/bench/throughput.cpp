@@ -5,11 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <thread>
 #include <utility>
 
 #include "dermis/cpu.h"
+#include "kit/bench/clip_crowd.h"
 #include "kit/bench/plain_batches.h"
 #include "kit/in_parallel.h"
 #include "kit/timed_batches.h"
@@ -174,6 +176,11 @@ std::vector<CpuCase> cpuCases() {
           {.name = "/scales", .scales = true}};
 }
 
+std::string cpuRow(Method method, std::uint32_t threads, std::string_view what) {
+  return "cpu/" + std::string(methodName(method)) + "/" + std::to_string(threads) +
+         std::string(what);
+}
+
 class CpuCrowd {
  public:
   static Result<CpuCrowd> create(const Crowd& crowd) {
@@ -271,8 +278,10 @@ class Rows : public Throughput {
     if (open != nullptr) {
       if (Result<void> made = makePlain(*open, crowd, step); !made) return made;
       if (Result<void> made = makeGpu(*open, crowd, step); !made) return made;
+      if (Result<void> made = makeGpuClips(*open, crowd, step); !made) return made;
     }
     if (Result<void> made = makeCpu(crowd, step); !made) return made;
+    if (Result<void> made = makeCpuClips(crowd, step); !made) return made;
     std::vector<std::size_t> order(rows_.size());
     for (std::size_t index = 0; index < order.size(); ++index) order[index] = index;
     std::ranges::stable_sort(order, {}, [this](std::size_t index) {
@@ -365,14 +374,54 @@ class Rows : public Throughput {
     return {};
   }
 
+  Result<void> makeGpuClips(OpenDevice& open, const Crowd& crowd,
+                            const std::function<void()>& step) {
+    if (!crowd.clips) return {};
+    Result<std::unique_ptr<ClipCrowd>> made = ClipCrowd::onDevice(open, crowd);
+    if (!made) return made.error();
+    gpuClips_ = std::move(*made);
+    constexpr std::size_t last = std::numeric_limits<std::size_t>::max();
+    return addClips(*gpuClips_, methodRow(Method::dualQuaternion, "float32x3/clips"),
+                    Section::formats, crowd, 1, step, last);
+  }
+
+  Result<void> makeCpuClips(const Crowd& crowd, const std::function<void()>& step) {
+    if (!crowd.clips) return {};
+    Result<std::unique_ptr<ClipCrowd>> made = ClipCrowd::onCpu(crowd);
+    if (!made) return made.error();
+    cpuClips_ = std::move(*made);
+    for (const std::uint32_t threads : threadCounts()) {
+      if (Result<void> added =
+              addClips(*cpuClips_, cpuRow(Method::dualQuaternion, threads, "/clips"), Section::cpu,
+                       crowd, threads, step);
+          !added)
+        return added;
+    }
+    return {};
+  }
+
+  /// Compares the second frame. The first also uploads meshes and clips, which is not timed.
+  Result<void> addClips(ClipCrowd& clips, std::string name, Section section, const Crowd& crowd,
+                        std::uint32_t threads, const std::function<void()>& step,
+                        std::size_t place = 0) {
+    for (int frame = 0; frame < 2; ++frame) {
+      if (const Result<double> skinned = clips.skin(threads); !skinned) return skinned.error();
+    }
+    if (Result<void> same = clips.check(); !same) return same;
+    add(
+        std::move(name), section, crowd.instanceCount(),
+        [&clips, threads] { return clips.skin(threads); }, place);
+    step();
+    return {};
+  }
+
   Result<void> makeCpu(const Crowd& crowd, const std::function<void()>& step) {
     Result<CpuCrowd> made = CpuCrowd::create(crowd);
     if (!made) return made.error();
     cpu_ = std::make_unique<CpuCrowd>(std::move(*made));
     for (const CpuCase& one : cpuCases()) {
       for (const std::uint32_t threads : threadCounts()) {
-        add("cpu/" + std::string(methodName(one.method)) + "/" + std::to_string(threads) + one.name,
-            Section::cpu, cpu_->instancesOf(one),
+        add(cpuRow(one.method, threads, one.name), Section::cpu, cpu_->instancesOf(one),
             [this, one, threads] { return cpu_->skin(one, threads); });
         if (const Result<double> first = cpu_->skin(one, threads); !first) return first.error();
         step();
@@ -387,6 +436,7 @@ class Rows : public Throughput {
   std::unique_ptr<TimedBatches> batches_;
   std::size_t batchCount_ = 0;
   std::unique_ptr<CpuCrowd> cpu_;
+  std::unique_ptr<ClipCrowd> gpuClips_, cpuClips_;
   std::vector<std::function<Result<double>()>> runs_;
 };
 
@@ -400,9 +450,10 @@ Result<std::unique_ptr<Throughput>> Throughput::create(OpenDevice* open, const C
 }
 
 std::size_t Throughput::rowCount(const OpenDevice* open, const Crowd& crowd) {
+  const std::size_t clips = crowd.clips ? 1 : 0;
   const std::size_t gpu =
-      open == nullptr ? 0 : plainKernelCount + gpuCases(crowd.instanceCount()).size();
-  return gpu + cpuCases().size() * threadCounts().size();
+      open == nullptr ? 0 : plainKernelCount + gpuCases(crowd.instanceCount()).size() + clips;
+  return gpu + (cpuCases().size() + clips) * threadCounts().size();
 }
 
 }  // namespace dermis::samples

@@ -32,8 +32,9 @@ class Throughput {
  public:
   /// Prepares all rows, and skins each once. Without a device, only the rows of the CPU. `open` and
   /// `crowd` must outlive this object. `step` is called once per row. Fails if a device fails, and
-  /// with `invalidData` if the plain kernels and Dermis skin differently: a baseline must do the
-  /// same work.
+  /// with `invalidData` if the plain kernels and Dermis skin differently, because a baseline must
+  /// do the same work, or if a crowd that plays clips is not where it should be. Without clips the
+  /// crowd has no rows of clips.
   static Result<std::unique_ptr<Throughput>> create(OpenDevice* open, const Crowd& crowd,
                                                     const std::function<void()>& step);
   virtual ~Throughput() = default;
