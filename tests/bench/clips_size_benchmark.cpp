@@ -171,6 +171,7 @@ Size dermisSize(const Subject& subject, const Measure& measure, double maxError)
   return {bank.bytes().size() - skeletonBytes(bank), error};
 }
 
+#ifdef DERMIS_BENCH_OZZ
 /// The bank whose error is just below one.
 Size dermisSizeAt(const Subject& subject, const Measure& measure, double error) {
   double low = error / 8, high = error * 8;
@@ -183,6 +184,7 @@ Size dermisSizeAt(const Subject& subject, const Measure& measure, double error) 
   }
   return best;
 }
+#endif
 
 }  // namespace
 
