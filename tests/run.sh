@@ -48,11 +48,13 @@ run_tests() { # FOLDER LABELS
 
 # build_and_test FOLDER LABELS PRESET [OPTION...]
 build_and_test() {
+  linker=
+  if command -v ld.gold >/dev/null; then linker=-DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=gold; fi # in half the time
   folder=$1
   labels=$2
   name=$(basename "$folder")
   shift 2
-  step "$name: configure" cmake -B "$folder" --preset "$@" >"$folder.log" || { cat "$folder.log"; return 1; }
+  step "$name: configure" cmake -B "$folder" --preset "$@" $linker >"$folder.log" || { cat "$folder.log"; return 1; }
   step "$name: build" cmake --build "$folder"
   # LLVM, which lavapipe uses, keeps memory until the process ends.
   export ASAN_OPTIONS="${ASAN_OPTIONS:-detect_leaks=0}"
