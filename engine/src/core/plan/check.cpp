@@ -15,13 +15,6 @@ namespace {
 
 constexpr std::uint64_t matrixAlignment = 16;
 
-Error wrongFormat(VertexFormat format, const char* name, const Subject& subject) {
-  if (format > allVertexFormats.back())
-    return notAValue(subject.name() + ": the format of its " + name, format, "VertexFormat");
-  return invalid(subject.name() + ": its " + name + " cannot be stored as " +
-                 std::string(formatName(format)));
-}
-
 Result<void> checkStreams(const Batch& batch, const Job& job, const OutputStreams& streams,
                           const Subject& subject) {
   const ByStream<std::uint64_t>& sizes = batch.outputSizes;
@@ -179,27 +172,6 @@ Result<void> checkPromise(JointPromise promise, const Subject& subject) {
   return notAValue(subject.name() + ": its promise", promise, "JointPromise");
 }
 
-Result<void> checkFormats(VertexFormat positions, VertexFormat normals, VertexFormat tangents,
-                          const Subject& subject) {
-  if (!isPositionFormat(positions)) return wrongFormat(positions, "positions", subject);
-  if (normals != VertexFormat::none && !isNormalFormat(normals))
-    return wrongFormat(normals, "normals", subject);
-  if (tangents != VertexFormat::none && !isTangentFormat(tangents))
-    return wrongFormat(tangents, "tangents", subject);
-  return {};
-}
-
-Result<void> checkPrevious(const VertexPlaces& places, const Subject& subject) {
-  const VertexFormat positions = places[Stream::positions].format;
-  const VertexFormat previous = places[Stream::previousPositions].format;
-  if (previous == positions || previous == VertexFormat::none) return {};
-  if (previous > allVertexFormats.back())
-    return wrongFormat(previous, "previous positions", subject);
-  return invalid(subject.name() + ": its previous positions are " +
-                 std::string(formatName(previous)) + ", but its positions " +
-                 std::string(formatName(positions)));
-}
-
 Result<void> checkVariant(const Variant& variant) {
   constexpr Subject subject{"the variant"};
   if (variant.kernel > Kernel::rig)
@@ -238,73 +210,6 @@ Result<VertexPlaces> checkNeeds(const PipelineNeeds& needs) {
   if (Result<void> good = checkRuns(job, outputStreams(job), {"the layout"}); !good)
     return good.error();
   return places;
-}
-
-namespace {
-
-/// A format with the same values, of whole words.
-VertexFormat formatOfWords(VertexFormat format) {
-  switch (format) {
-    case VertexFormat::float16x3:
-      return VertexFormat::float16x4;
-    case VertexFormat::snorm16x3:
-      return VertexFormat::snorm16x4;
-    case VertexFormat::snorm8x3:
-      return VertexFormat::snorm8x4;
-    case VertexFormat::octahedral8x2:
-      return VertexFormat::octahedral16x2;
-    default:
-      return format;
-  }
-}
-
-/// Attributes of a vertex that follow each other.
-struct AttributeRun {
-  std::size_t first = 0;     ///< by `Stream`
-  std::size_t part = 0;      ///< the last one that is not whole words
-  std::uint32_t length = 0;  ///< bytes
-};
-
-bool isOfWords(const OutputStreams& streams, const AttributeRun& run) {
-  const OutputStream& first = streams[run.first];
-  return (first.offset | first.stride | run.length) % 4 == 0;
-}
-
-Error wrongRun(const Job& job, const AttributeRun& run, const OutputStream& first,
-               const Subject& subject) {
-  if (run.length % 4 == 0) {
-    return invalid(subject.name() + ": offset " + std::to_string(first.offset) + " and stride " +
-                   std::to_string(first.stride) + " of its " + streamName(run.first) +
-                   " must be multiples of 4");
-  }
-  const std::array formats{job.places[Stream::positions].format, job.places[Stream::normals].format,
-                           job.places[Stream::tangents].format,
-                           job.places[Stream::positions].format};
-  return invalid(subject.name() + ": its " + streamName(run.part) + " as " +
-                 std::string(formatName(formats[run.part])) + " are in a run of " +
-                 std::to_string(run.length) + " bytes, which is not a multiple of 4; use " +
-                 std::string(formatName(formatOfWords(formats[run.part]))));
-}
-
-}  // namespace
-
-Result<void> checkRuns(const Job& job, const OutputStreams& streams, const Subject& subject) {
-  AttributeRun run;
-  std::uint64_t end = streams[0].offset;
-  for (std::size_t index = 0; index < streamCount; ++index) {
-    const OutputStream& stream = streams[index];
-    if (stream.size == 0) continue;
-    const bool follows = stream.offset == end && stream.stride == streams[run.first].stride;
-    if (!follows || index == static_cast<std::size_t>(Stream::previousPositions)) {
-      if (!isOfWords(streams, run)) return wrongRun(job, run, streams[run.first], subject);
-      run = {index, index, 0};
-    }
-    if (stream.size % 4 != 0) run.part = index;
-    run.length += stream.size;
-    end = stream.offset + stream.size;
-  }
-  if (!isOfWords(streams, run)) return wrongRun(job, run, streams[run.first], subject);
-  return {};
 }
 
 Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& streams,
