@@ -16,7 +16,6 @@
 #include "dermis/vulkan/scene_recorder.h"
 #include "mock_batch.h"
 #include "mock_vulkan.h"
-#include "plan/placement.h"
 #include "plan_commands.h"
 
 namespace dermis::test {

@@ -12,6 +12,7 @@
 
 #include "abi.h"
 #include "plan/placement.h"
+#include "plan/work.h"
 #include "plan_commands.h"
 #include "random_rig.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core_plan_simulation.h"
-#include "plan/placement.h"
+#include "plan/work.h"
 #include "plan_commands.h"
 
 namespace dermis::test {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "abi.h"
-#include "plan/placement.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
 

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <initializer_list>
-#include <optional>
 #include <string>
 
 #include "abi.h"
@@ -262,28 +261,6 @@ Result<void> checkJob(const Batch& batch, const Job& job, const OutputStreams& s
   }
   if (Result<void> good = checkTogether(batch, job, streams, subject); !good) return good;
   return checkStreams(batch, job, streams, subject);
-}
-
-Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
-                          const OutputWindows& windows, const Subject& subject,
-                          const DeviceLimits& limits) {
-  const bool hasFewBuffers = limits.maxStorageBuffersPerStage < storageBuffersWanted;
-  if (!hasFewBuffers && limits.separateRanges) return {};
-  std::optional<std::uint32_t> common;
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
-    if (common.value_or(run.windows[stream]) != run.windows[stream]) {
-      return Error{ErrorCode::limitExceeded,
-                   subject.name() + ": its " + streamName(stream) +
-                       " are too far from the preceding attribute for a device " +
-                       (hasFewBuffers ? "with " + std::to_string(limits.maxStorageBuffersPerStage) +
-                                            " storage buffers per stage"
-                                      : "that cannot bind a separate range of the output for each "
-                                        "attribute (DeviceLimits::separateRanges)")};
-    }
-    common = run.windows[stream];
-  }
-  return {};
 }
 
 Result<void> checkPose(const Batch& batch, const PoseDescription& pose, std::size_t index) {

@@ -70,9 +70,5 @@ struct BoxScale {
 DERMIS_CORE_API BoxScale boxScale(const Box& box);
 DERMIS_CORE_API Result<void> checkMorphs(std::span<const MorphWeight> morphs,
                                          std::uint32_t targetCount, const Subject& subject);
-/// Whether a kernel can see all windows that a run is written to.
-Result<void> checkWindows(const OutputStreams& streams, const VertexRun& run,
-                          const OutputWindows& windows, const Subject& subject,
-                          const DeviceLimits& limits);
 
 }  // namespace dermis

@@ -1,7 +1,6 @@
 #include "plan/placement.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 
 #include "plan/check.h"
@@ -333,86 +332,6 @@ Result<std::vector<PipelineId>> pipelines(const PipelineNeeds& needs, const Devi
   if (needs.morphsOnGpu) variants.push_back(variantOf(Kernel::morphLists, limits, tuning));
   if (needs.culledOnGpu) variants.push_back(variantOf(Kernel::visibility, limits, tuning));
   return idsOf(variants);
-}
-
-// -- Windows.
-
-namespace {
-
-/// Bytes that two adjacent windows share.
-std::uint64_t windowOverlap(std::uint64_t range) {
-  return range / 16;
-}
-
-/// Maximum bytes of a run: half of the overlap. A run that begins in a window then ends in it, even
-/// if an attribute begins up to that many bytes after the first.
-std::uint64_t longestRun(std::uint64_t range) {
-  return windowOverlap(range) / 2;
-}
-
-/// Returns whether the run lies in the windows that it begins in.
-bool chooseWindows(const OutputStreams& streams, const OutputWindows& windows, VertexRun& run) {
-  std::uint64_t common = std::numeric_limits<std::uint64_t>::max();
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
-    const std::uint64_t window = streams[stream].begin(run.firstVertex) / windows.step;
-    run.windows[stream] = static_cast<std::uint32_t>(window);
-    common = std::min(common, window);
-  }
-  bool isInCommon = true;
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size != 0 && windows.oversized[stream] &&
-        streams[stream].end(run.vertexEnd) > common * windows.step + windows.range)
-      isInCommon = false;
-  }
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
-    if (isInCommon) run.windows[stream] = static_cast<std::uint32_t>(common);
-    if (streams[stream].end(run.vertexEnd) > run.windows[stream] * windows.step + windows.range)
-      return false;
-  }
-  return true;
-}
-
-}  // namespace
-
-std::uint64_t outputWindowStep(const DeviceLimits& limits) {
-  const std::uint64_t step =
-      limits.maxStorageBufferRange - windowOverlap(limits.maxStorageBufferRange);
-  // A multiple of everything that one store may write.
-  return step - step % (3 * std::max<std::uint64_t>(limits.minStorageBufferOffsetAlignment, 32));
-}
-
-OutputWindows::OutputWindows(const ByStream<std::uint64_t>& outputSizes, const DeviceLimits& limits)
-    : range(limits.maxStorageBufferRange), step(outputWindowStep(limits)) {
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    oversized[stream] = outputSizes[stream] > range;
-    isAnyOversized = isAnyOversized || oversized[stream];
-  }
-}
-
-void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
-                 const OutputWindows& windows, std::vector<VertexRun>& runs) {
-  runs.clear();
-  VertexRun& whole = runs.emplace_back();
-  whole.vertexEnd = vertexCount;
-  if (!windows.isAnyOversized || chooseWindows(streams, windows, whole)) return;
-  runs.clear();
-  std::uint64_t longest = vertexCount;
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    if (streams[stream].size == 0 || !windows.oversized[stream]) continue;
-    longest = std::min(longest,
-                       (longestRun(windows.range) - streams[stream].size) / streams[stream].stride +
-                           std::uint64_t{1});
-  }
-  for (std::uint64_t vertex = 0; vertex < vertexCount; vertex += longest) {
-    VertexRun run;
-    run.firstVertex = static_cast<std::uint32_t>(vertex);
-    run.vertexEnd =
-        static_cast<std::uint32_t>(std::min<std::uint64_t>(vertex + longest, vertexCount));
-    chooseWindows(streams, windows, run);
-    runs.push_back(run);
-  }
 }
 
 }  // namespace dermis

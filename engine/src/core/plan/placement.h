@@ -1,5 +1,4 @@
-// Chooses the kernel of an instance, and the output windows that its vertices are written to.
-// Neither depends on a frame.
+// Chooses the kernel of an instance. It does not depend on a frame.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +10,6 @@
 #include "plan/variant.h"
 
 namespace dermis {
-
-/// Bytes from the beginning of one output window to the beginning of the next. A window has at most
-/// `maxStorageBufferRange` bytes. Windows overlap, so that each instance, or each part of a large
-/// instance, lies in one window.
-DERMIS_CORE_API std::uint64_t outputWindowStep(const DeviceLimits& limits);
 
 /// One attribute of a job's output; `size` 0 if it is not wanted.
 struct OutputStream {
@@ -150,30 +144,5 @@ inline bool standsTogether(const OutputStreams& streams) {
   return normals.size + tangents.size != 0 && standsAt(normals, end) &&
          standsAt(tangents, end + normals.size);
 }
-
-// -- Windows: ranges through which an output larger than `maxStorageBufferRange` is written.
-
-/// What the windows of the outputs depend on, besides jobs.
-struct OutputWindows {
-  OutputWindows() = default;
-  OutputWindows(const ByStream<std::uint64_t>& outputSizes, const DeviceLimits& limits);
-
-  std::uint64_t range = 0;      ///< bytes of the largest window
-  std::uint64_t step = 0;       ///< `outputWindowStep`
-  ByStream<bool> oversized{};   ///< the output is larger than a window
-  bool isAnyOversized = false;  ///< usually false
-};
-
-/// Consecutive vertices of one job. Each of their attributes lies in one window of its buffer.
-struct VertexRun {
-  std::uint32_t firstVertex = 0;
-  std::uint32_t vertexEnd = 0;
-  ByStream<std::uint32_t> windows{};
-};
-
-/// Cuts the vertices of a job into runs: one if each attribute lies in one window. Attributes that
-/// are near each other get windows of the same number.
-void cutIntoRuns(const OutputStreams& streams, std::uint32_t vertexCount,
-                 const OutputWindows& windows, std::vector<VertexRun>& runs);
 
 }  // namespace dermis
