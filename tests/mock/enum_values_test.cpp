@@ -28,7 +28,7 @@
 #include "dermis/vulkan/drawing.h"
 #include "dermis/vulkan/scene_recorder.h"
 #include "mock_batch.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 #include "planned_scene.h"
 #include "scene_meshes.h"
 #include "test_paths.h"

@@ -1,5 +1,5 @@
 // What a kernel should write for a value, in double precision and by the plainest means: each
-// component rounded to the nearest that its format has, as vertex_format.h documents.
+// component rounded to the nearest that its format has, as layout.h documents.
 #pragma once
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "abi.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 #include "plan/work.h"
 #include "plan_commands.h"
 #include "random_rig.h"

@@ -13,7 +13,7 @@
 #include "attribute.h"
 #include "dermis/plan.h"
 #include "plan/check.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 #include "strict_floating_point.h"
 
 namespace dermis {

@@ -6,11 +6,26 @@
 #include <string_view>
 #include <utility>
 
+#include "abi.h"
+#include "dermis_kernels.h"
 #include "plan/check.h"
+#include "plan/variant.h"
 
 namespace dermis::vulkan {
 
 namespace {
+
+/// Without SPIR-V if this build does not have it.
+PipelineDescription descriptionOf(const Variant& variant) {
+  PipelineDescription description;
+  description.name = pipelineName(variant);
+  description.module = moduleName(variant);
+  description.spirv = kernels::find(description.module);
+  description.constants = constantsOf(variant);
+  description.storageBuffers = variant.oneOutput ? abi::MIN_BINDING_COUNT : abi::BINDING_COUNT;
+  description.texelBuffers = variant.texels ? abi::TEXEL_BINDING_COUNT : 0;
+  return description;
+}
 
 /// Checks that a device with these features can use the module for a variant.
 Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
@@ -27,6 +42,14 @@ Result<void> checkFeatures(const Variant& variant, const DeviceLimits& limits) {
 }
 
 }  // namespace
+
+Result<PipelineDescription> pipelineDescription(PipelineId id) {
+  if (Result<void> good = checkPipeline(id); !good) return good.error();
+  PipelineDescription description = descriptionOf(variantOf(id));
+  if (!description.spirv.empty()) return description;
+  return Error{ErrorCode::missingFeature,
+               "this build of Dermis has no kernel '" + description.module + "'"};
+}
 
 Pipelines::~Pipelines() {
   destroy(pipelines_);

@@ -4,7 +4,6 @@
 #include <mutex>
 #include <shared_mutex>
 #include <span>
-#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -13,17 +12,9 @@
 #include "dermis/plan.h"
 #include "dermis/result.h"
 #include "dermis/vulkan/context.h"
-#include "plan/variant.h"
 #include "vulkan/dispatch_table.h"
 
 namespace dermis::vulkan {
-
-/// `PipelineDescription::name`.
-std::string pipelineName(const Variant& variant);
-/// `PipelineDescription::module`.
-std::string moduleName(const Variant& variant);
-/// Without SPIR-V if this build does not have it.
-PipelineDescription descriptionOf(const Variant& variant);
 
 class Pipelines {
  public:

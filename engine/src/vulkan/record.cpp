@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "dermis/vulkan/context.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 #include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
 

@@ -7,7 +7,7 @@
 
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 
 namespace dermis {
 

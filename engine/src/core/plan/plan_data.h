@@ -10,7 +10,7 @@
 #include "abi.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
-#include "plan/placement.h"
+#include "plan/variant.h"
 
 namespace dermis {
 
