@@ -86,7 +86,7 @@ Comparison comparePose(std::span<const JointMatrix> pose, const reference::Sampl
                        const SkeletonSkin& skin) {
   Comparison comparison;
   for (std::size_t joint = 0; joint < pose.size(); ++joint) {
-    const auto [atJoint, perDistance] = expected.bounds[joint];
+    const auto [atJoint, perDistance, shape] = expected.bounds[joint];
     if (!std::isfinite(perDistance)) {
       if (!std::isfinite(atJoint)) {
         ++comparison.exempt.outOfRange;

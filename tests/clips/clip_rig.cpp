@@ -183,11 +183,15 @@ double PackedRig::check(std::span<const ClipLayer> layers) const {
   return worst;
 }
 
+Result<reference::SampledPose> PackedRig::expected(std::span<const ClipLayer> layers,
+                                                   std::uint32_t skin) const {
+  return reference::samplePose(skeleton, clips, maskSpans(), layers, skin, &*bank,
+                               options.rootMotion ? &*options.rootMotion : nullptr);
+}
+
 double PackedRig::checkSkin(std::span<const ClipLayer> layers, std::uint32_t skin) const {
   const std::vector<JointMatrix> pose = sample(layers, skin);
-  const Result<reference::SampledPose> expected =
-      reference::samplePose(skeleton, clips, maskSpans(), layers, skin, &*bank,
-                            options.rootMotion ? &*options.rootMotion : nullptr);
+  const Result<reference::SampledPose> expected = this->expected(layers, skin);
   if (!expected) {
     ADD_FAILURE() << expected.error().message;
     return HUGE_VAL;
@@ -196,11 +200,16 @@ double PackedRig::checkSkin(std::span<const ClipLayer> layers, std::uint32_t ski
   for (std::size_t joint = 0; joint < pose.size(); ++joint) {
     const dmat4 sampled = matrixOf(pose[joint].m);
     EXPECT_TRUE(std::isfinite(largestEntry(sampled))) << "joint " << joint;
-    const auto [atJoint, perDistance] = expected->bounds.at(joint);
+    const auto [atJoint, perDistance, shape] = expected->bounds.at(joint);
     // Without an inverse there is no frame of the joint.
     if (!std::isfinite(atJoint) || !std::isfinite(perDistance)) continue;
-    const dmat4 error = (sampled - matrixOf(expected->joints[joint])) *
-                        glm::inverse(matrixOf(skeleton.skins[skin].inverseBind[joint].m));
+    // A rotation changes no length.
+    const auto stretchOf = [](const auto& matrix, const dvec3& toward) {
+      return glm::length(dvec3(matrix * dvec4(toward, 0))) / glm::length(toward);
+    };
+    const dmat4 source = matrixOf(expected->joints[joint]);
+    const dmat4 error =
+        (sampled - source) * glm::inverse(matrixOf(skeleton.skins[skin].inverseBind[joint].m));
     for (const double distance : {0.0, 1e-3 * extent_, extent_, 10 * extent_}) {
       for (int direction = 0; direction < 27; ++direction) {
         const dvec3 toward(direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1);
@@ -209,6 +218,9 @@ double PackedRig::checkSkin(std::span<const ClipLayer> layers, std::uint32_t ski
         const double off = glm::length(dvec3(error * dvec4(point, 1)));
         const double bound = atJoint + perDistance * distance;
         if (off > 0) worst = std::max(worst, off / bound);
+        if (distance != extent_) continue;
+        const double stretched = std::abs(stretchOf(sampled, toward) - stretchOf(source, toward));
+        if (stretched > 0) worst = std::max(worst, stretched / shape);
       }
     }
   }

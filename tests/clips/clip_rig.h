@@ -14,6 +14,7 @@
 
 #include "dermis/clips.h"
 #include "dermis/gltf.h"
+#include "dermis/verify.h"
 
 namespace dermis::test {
 
@@ -64,6 +65,9 @@ class PackedRig {
   std::vector<JointMatrix> sample(const ClipLayer& layer, std::uint32_t skin = 0) const {
     return sample(std::span(&layer, 1), skin);
   }
+  /// What the reference has of the source instead, with bounds.
+  Result<reference::SampledPose> expected(std::span<const ClipLayer> layers,
+                                          std::uint32_t skin) const;
   /// Checks the poses of up to four skins, in turn, against the reference and its bounds. Returns
   /// the largest error divided by its bound.
   double check(std::span<const ClipLayer> layers) const;

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -15,16 +13,13 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
-#include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include "clip_rig.h"
 #include "dermis/verify.h"
 #include "few_cases.h"
 #include "gltf_builder.h"
 #include "golden_file.h"
-#include "matrix_of.h"
 #include "scene_meshes.h"
 #include "test_data.h"
 
@@ -32,10 +27,8 @@ namespace dermis::test {
 namespace {
 
 using glm::dvec3;
-using glm::dvec4;
 
-/// The positions by linear blending, and how far off each may be by the bounds of its joints: a
-/// blend is at most as far off as the joint that is farthest off.
+/// The positions by linear blending, and how far off each may be.
 struct BankPositions {
   std::vector<dvec3> positions;
   std::vector<double> bounds;
@@ -60,15 +53,6 @@ std::vector<MorphWeight> morphsOf(const gltf::Model& model, const gltf::SkinnedP
   return morphs;
 }
 
-template <typename Stored>
-Stored component(const AttributeView& view, std::uint32_t element, std::uint32_t number) {
-  Stored value;
-  const auto* const bytes =
-      static_cast<const std::byte*>(view.data) + std::size_t{element} * view.stride;
-  std::memcpy(&value, bytes + number * sizeof(Stored), sizeof(Stored));
-  return value;
-}
-
 void addPrimitive(const PackedRig& rig, const gltf::SkinnedPrimitive& part,
                   std::span<const ClipLayer> layers, BankPositions& result) {
   const SkeletonSkin& skin = rig.skeleton.skins[part.skin];
@@ -83,20 +67,9 @@ void addPrimitive(const PackedRig& rig, const gltf::SkinnedPrimitive& part,
 
   const reference::SampledPose expected =
       must(reference::samplePose(rig.skeleton, rig.clips, {}, layers, part.skin, &*rig.bank));
-  const std::vector<JointMatrix> atRest(skin.joints.size());
-  const InfluenceSet& influences = mesh.view().influenceSets[0];  // uint32 and float32
-  const std::vector<dvec3> points = skinned(mesh.view(), atRest, morphs);
-  for (std::uint32_t vertex = 0; vertex < points.size(); ++vertex) {
-    double bound = 0;
-    for (std::uint32_t i = 0; i < influences.joints.components; ++i) {
-      if (component<float>(influences.weights, vertex, i) == 0) continue;
-      const auto joint = component<std::uint32_t>(influences.joints, vertex, i);
-      const auto [atJoint, perDistance] = expected.bounds[joint];
-      const dvec3 inJoint(matrixOf(skin.inverseBind[joint].m) * dvec4(points[vertex], 1));
-      bound = std::max(bound, atJoint + perDistance * glm::length(inJoint));
-    }
-    result.bounds.push_back(bound);
-  }
+  for (const reference::VertexBounds& bounds :
+       must(reference::skin(mesh.view(), expected, Method::linear, morphs)).bounds)
+    result.bounds.push_back(bounds.position);
 }
 
 TEST(ClipsGolden, EveryPoseAgrees) {

@@ -238,7 +238,7 @@ gltf::Model originRig() {
   return model;
 }
 
-std::vector<std::array<double, 2>> boundsOf(const PackedRig& rig, const ClipLayer& layer) {
+std::vector<std::array<double, 3>> boundsOf(const PackedRig& rig, const ClipLayer& layer) {
   const Result<reference::SampledPose> pose =
       reference::samplePose(rig.skeleton, rig.clips, {}, {&layer, 1}, 0, &*rig.bank);
   EXPECT_TRUE(pose.ok());
@@ -255,10 +255,11 @@ TEST(ClipsRange, BoundsAllowForDenormals) {
     ASSERT_TRUE(rig.pack());
     for (const double time : {0.0, 0.3, 0.77}) {
       rig.check(ClipLayer{.time = time});
-      for (const auto& [atJoint, perDistance] : boundsOf(rig, {.time = time})) {
+      for (const auto& [atJoint, perDistance, shape] : boundsOf(rig, {.time = time})) {
         EXPECT_GE(atJoint, 0x1p-125);
         EXPECT_LE(atJoint, 1e-30);
         EXPECT_LE(perDistance, 1e-3);
+        EXPECT_LE(shape, 1e-5) << "a turn is none";
       }
     }
   }
@@ -269,7 +270,7 @@ TEST(ClipsRange, NoBoundHoldsBeyondTheRange) {
   rig.skeleton.nodes[0].scale = rig.skeleton.nodes[1].scale = {1e20, 1e20, 1e20};
   rig.options.maxError = 1e17;
   ASSERT_TRUE(rig.pack());
-  std::vector<std::array<double, 2>> bounds = boundsOf(rig, {.time = 0.3});
+  std::vector<std::array<double, 3>> bounds = boundsOf(rig, {.time = 0.3});
   for (const double bound : bounds[0]) EXPECT_TRUE(std::isfinite(bound));
   for (const double bound : bounds[1]) EXPECT_TRUE(std::isinf(bound));
   // An additive clip may reach it between its layers.
@@ -290,7 +291,7 @@ TEST(ClipsRange, AJointWithASingularInverseBindMatrixIsFinite) {
   inverseBind[1].m[2][2] = 0;
   rig.skeleton.skins[0].inverseBind = inverseBind;
   ASSERT_TRUE(rig.pack());
-  const std::vector<std::array<double, 2>> bounds = boundsOf(rig, {.time = 0.3});
+  const std::vector<std::array<double, 3>> bounds = boundsOf(rig, {.time = 0.3});
   for (const double bound : bounds[0]) EXPECT_TRUE(std::isfinite(bound));
   EXPECT_TRUE(std::isfinite(bounds[1][0]));
   EXPECT_TRUE(std::isinf(bounds[1][1]));

@@ -79,12 +79,14 @@ DERMIS_VERIFY_API Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const
 /// What `samplePose` returns.
 struct SampledPose {
   std::vector<Transform> joints;  ///< joint global transforms × inverse bind matrices
-  /// How near a pose of the bank must be: {A, B} for each joint, or empty if there was no bank. Its
-  /// joint matrix moves a point p of bind space to at most A + B d from where `joints` moves it. d
-  /// is the length of inverse bind matrix × p: how far p is from the joint, in the joint's frame.
-  /// B is infinite if the inverse bind matrix is singular: the joint matrix must only be finite.
-  /// Both are if numbers leave the range of float32: then it may be anything.
-  std::vector<std::array<double, 2>> bounds;
+  /// How near a pose of the bank must be: {A, B, C} for each joint, or empty if there was no bank.
+  /// Its joint matrix moves a point p of bind space to at most A + B d from where `joints` moves
+  /// it. d is the length of inverse bind matrix × p: how far p is from the joint, in the joint's
+  /// frame. Except for a rotation, its 3×3 part is at most C from that of `joints` (spectral norm).
+  /// B and C are infinite if the inverse bind matrix is singular: the joint matrix must only be
+  /// finite. All are if numbers leave the range of float32: then it may be anything.
+  std::vector<std::array<double, 3>> bounds;
+  std::vector<JointMatrix> inverseBind;  ///< one for each of the bounds
 };
 
 /// Samples the pose of a skin from the clips that a bank is made of, as `dermis::samplePose` does
@@ -104,6 +106,16 @@ DERMIS_VERIFY_API Result<SampledPose> samplePose(const Skeleton& skeleton,
                                                  std::uint32_t skin,
                                                  const PackedClips* bank = nullptr,
                                                  const RootMotionOptions* rootMotion = nullptr);
+
+/// Skins a mesh in a pose that was sampled with a bank. The bounds are those for vertices that a
+/// device skins in the bank's pose. They consist of what `SampledPose::bounds` makes of the vertex,
+/// and of the bounds of the other `skin` for the worst pose of the bank. Morph weights are exact:
+/// pass those of the device.
+///
+/// Fails with `invalidArgument` as well if the pose has no bounds, and for methods that are
+/// `isForComparison`.
+DERMIS_VERIFY_API Result<SkinnedMesh> skin(const MeshView& mesh, const SampledPose& pose,
+                                           Method method, std::span<const MorphWeight> morphs = {});
 
 /// What `rootMotion` returns.
 struct SampledMotion {

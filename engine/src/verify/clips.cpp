@@ -376,6 +376,7 @@ Result<Layer> toLayer(const ClipLayer& from, std::span<const ClipView> clips,
 
 struct LocalError {
   double translation = 0, rotation = 0, scale = 0;
+  double rounding = 0;  ///< of the 3×3 matrix of the rotation: how far it is from any rotation
 };
 
 double largestOf(const dvec3& v) {
@@ -421,13 +422,14 @@ Local blend(const Skeleton& skeleton, std::uint32_t node, std::span<const Layer>
   if (total == 0) {
     const Local rest = restOf(skeleton.nodes[node]);
     error = {16 * u * glm::length(rest.translation) + flushedMatrix, 32 * u,
-             16 * u * largestOf(rest.scale) + flushedMatrix};
+             16 * u * largestOf(rest.scale) + flushedMatrix, 32 * u};
     checkRange(rest, error);
     return rest;
   }
   error.translation = double{clipError.translation} + 16 * u * translations / total + flushedVector;
   error.rotation = turnOf(total * angle, sum.rotation, eitherHemisphere) + 32 * u;
   error.scale = double{clipError.scale} + 16 * u * scales / total + flushedVector;
+  error.rounding = 32 * u;
   const Local mean{sum.translation / total, glm::normalize(sum.rotation), sum.scale / total};
   checkRange(mean, error);
   return mean;
@@ -444,6 +446,7 @@ void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
   const double angle = double{clipError.rotation} + 16 * u;
   const dquat turn = dquat(1 - factor, 0, 0, 0) + difference.rotation * factor;
   error.rotation += turnOf(size * angle, turn, std::abs(difference.rotation.w) <= angle) + 32 * u;
+  error.rounding += 32 * u;
   local.rotation = glm::normalize(local.rotation * glm::normalize(turn));
 
   local.translation += factor * difference.translation;
@@ -484,15 +487,26 @@ void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
 // off by 2^-126 for each of its products and sums. What is left of that matrix is a G of a node
 // above i; what is right of it is y_i. If a product of sizes is too large for float32, there is no
 // bound.
+//
+// Shape: how far the 3×3 part of G~ is from Q G, with Q the rotation that suits best. For the
+// parent of i, `warp` is such a bound, F the error and G = m O + K, with O orthogonal and m between
+// the singular values, so that 2 ‖K‖ = σ1 − σ3 = `spread`. Node i has M = R S and M~ = E R (S + D),
+// with E a rotation by the angle a, and D the error of the scale. With P = O E Oᵀ
+//
+//     (Q G + F) M~ = Q P G M + Q (K (E − 1) − (P − 1) K) R S + Q G E R D + F M~,
+//
+// so warp ≤ spread · a · largest scale + ‖G‖ · scale error + parent's warp · ‖M~‖, and what float32
+// adds. A rotation error changes no shape unless a node above is stretched.
 
 struct PosedNode {
   dmat4 local{1.0}, global{1.0};
   double shift = 0, turn = 0;  ///< |(M~ − M) y| ≤ shift + turn |y|
   double drift = 0;            ///< ‖G~ − G‖ at most
-  double stretch = 1;          ///< ‖G~‖ at most
-  double product = 1;          ///< P
-  double span = 0;             ///< T
-  double above = 1;            ///< 1, and ‖G~‖ of all nodes above at most
+  double warp = 0, spread = 0;
+  double stretch = 1;  ///< ‖G~‖ at most
+  double product = 1;  ///< P
+  double span = 0;     ///< T
+  double above = 1;    ///< 1, and ‖G~‖ of all nodes above at most
   bool mayOverflow = false;
 };
 
@@ -521,25 +535,32 @@ PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const
     for (glm::length_t i = 0; i < 3; ++i) posed.local[i] *= local.scale[i];
     posed.local[3] = {local.translation, 1};
     posed.shift = error.translation;
-    posed.turn = error.rotation * largestOf(local.scale) + error.scale;
+    const double largest = largestOf(local.scale);
+    posed.turn = error.rotation * largest + error.scale;
+    posed.warp = (above.spread * error.rotation + above.stretch * error.rounding) * largest +
+                 above.stretch * error.scale;
   }
   posed.global = above.global * posed.local;
   if (clipError == nullptr) return posed;
   posed.mayOverflow =
       above.mayOverflow || !(sumOfSizes(posed.local) + posed.shift + posed.turn <= mostSize);
   if (posed.mayOverflow) return posed;
+  const dvec3 values = singularValues(dmat3(posed.global)).values;
+  posed.spread = values[0] - values[2];
   const double norm = normOf(posed.local);
   posed.product = above.product * (norm + posed.turn);
   posed.span = above.span + above.product * (glm::length(dvec3(posed.local[3])) + posed.shift);
   posed.above = std::max(above.above, above.stretch);
   posed.drift = above.drift * norm + above.stretch * posed.turn + 16 * u * posed.product +
                 flushedMatrix * posed.above;
+  posed.warp +=
+      above.warp * (norm + posed.turn) + 16 * u * posed.product + flushedMatrix * posed.above;
   posed.mayOverflow = !(posed.product <= mostSize) || !(posed.span <= mostSize);
-  if (!posed.mayOverflow) posed.stretch = normOf(posed.global) + posed.drift;
+  if (!posed.mayOverflow) posed.stretch = values[0] + posed.drift;
   return posed;
 }
 
-std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
+std::array<double, 3> boundOf(std::span<const PosedNode> nodes,
                               std::span<const std::uint32_t> parents, std::uint32_t joint,
                               const dmat4& inverseBind) {
   // p = L⁻¹ (x − t), with L the linear part of the inverse bind matrix and t its translation.
@@ -547,8 +568,8 @@ std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
   const dvec3 t(inverseBind[3]);
   const PosedNode& last = nodes[joint];
   const double size = last.product * (values[0] + glm::length(t)) + last.span;
-  if (last.mayOverflow || !(size <= mostSize)) return {noBound, noBound};
-  if (values[2] == 0) return {mostSize, noBound};
+  if (last.mayOverflow || !(size <= mostSize)) return {noBound, noBound, noBound};
+  if (values[2] == 0) return {mostSize, noBound, noBound};
   const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
   const double flushedJoint = flushedMatrix * std::max(last.above, last.stretch);
   double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span) +
@@ -566,7 +587,8 @@ std::array<double, 2> boundOf(std::span<const PosedNode> nodes,
     perDistance += turn * normOf(below);
     below = posed.local * below;
   }
-  return {atJoint, perDistance};
+  const double shape = (last.warp + 16 * u * last.product) * values[0] + flushedJoint;
+  return {atJoint, perDistance, std::min(shape, perDistance * values[0])};
 }
 
 /// Checks clips, masks and layers.
@@ -632,7 +654,9 @@ Result<SampledPose> samplePose(const Skeleton& skeleton, std::span<const ClipVie
       for (std::size_t column = 0; column < 4; ++column)
         result[row][column] =
             matrix[static_cast<glm::length_t>(column)][static_cast<glm::length_t>(row)];
-    if (bank != nullptr) pose.bounds.push_back(boundOf(nodes, parents, joint, inverseBind));
+    if (bank == nullptr) continue;
+    pose.bounds.push_back(boundOf(nodes, parents, joint, inverseBind));
+    pose.inverseBind.push_back(posedSkin.inverseBind[index]);
   }
   return pose;
 }

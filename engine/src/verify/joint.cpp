@@ -136,10 +136,16 @@ dvec4 quaternionOf(const dmat3& r) {
 }  // namespace
 
 Joint takeApart(const JointMatrix& matrix) {
+  Transform exact;
+  for (std::size_t row = 0; row < 3; ++row) std::ranges::copy(matrix.m[row], exact[row].begin());
+  return takeApart(exact);
+}
+
+Joint takeApart(const Transform& matrix) {
   Joint joint;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const double value = static_cast<double>(matrix.m[row][column]);
+      const double value = matrix[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
       joint.finite &= std::isfinite(value);
       if (column < 3) {
         joint.linear[column][row] = value;

@@ -5,6 +5,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include "dermis/clips.h"
 #include "dermis/mesh.h"
 #include "verify/rigid.h"
 
@@ -49,6 +50,7 @@ struct Joint {
 };
 
 /// Decomposes a joint. A matrix that is not finite gives NaNs.
+Joint takeApart(const Transform& matrix);
 Joint takeApart(const JointMatrix& matrix);
 
 }  // namespace dermis::reference

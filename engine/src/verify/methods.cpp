@@ -17,11 +17,6 @@ using glm::dmat3;
 using glm::dvec3;
 using glm::dvec4;
 
-dmat3 adjugateTranspose(const dmat3& m) {
-  // The cofactor matrix: each column is the cross product of the other two.
-  return dmat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
-}
-
 /// Transforms a normal by the inverse transpose of m, without normalizing. Finite even if m is
 /// singular.
 dvec3 transformNormal(const BlendedMatrix& matrix, const dvec3& normal,
@@ -64,8 +59,8 @@ BlendedMatrix::BlendedMatrix(const dmat3& matrix, double largestOfJoints)
       largest(singularValues(matrix).values[0]),
       stretch(largestOfJoints) {}
 
-bool BlendedMatrix::isFlat() const {
-  return std::abs(determinant) <= (1e-5 * stretch + flushed) * largest * largest;
+bool BlendedMatrix::isFlat(double error) const {
+  return std::abs(determinant) <= (error + 1e-5 * stretch + flushed) * largest * largest;
 }
 
 BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,
@@ -73,6 +68,11 @@ BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& ve
   return {vertex.position, unitOrZero(transformNormal(matrix, vertex.normal, conditioning)),
           unitOrZero(transformTangent(matrix, vertex.tangent, conditioning)),
           transformHandedness(matrix, vertex.handedness, conditioning)};
+}
+
+dmat3 adjugateTranspose(const dmat3& m) {
+  // Each column is the cross product of the other two.
+  return dmat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
 }
 
 dvec3 unitOrZero(const dvec3& v) {

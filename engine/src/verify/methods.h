@@ -63,8 +63,9 @@ struct BlendedMatrix {
   BlendedMatrix(const glm::dmat3& matrix, double largestOfJoints);
 
   /// Whether rounding or flushed denormals decide the sign of the determinant: whether they may be
-  /// as large as the smallest singular value, which is at least |det| / σ_max².
-  bool isFlat() const;
+  /// as large as the smallest singular value, which is at least |det| / σ_max². So may `error`, the
+  /// norm of what the matrix is off by.
+  bool isFlat(double error = 0) const;
 
   glm::dmat3 m;
   double determinant;
@@ -79,6 +80,8 @@ struct BlendedMatrix {
 BindVertex transformDirections(const BlendedMatrix& matrix, const BindVertex& vertex,
                                Conditioning& conditioning);
 
+/// The cofactor matrix.
+glm::dmat3 adjugateTranspose(const glm::dmat3& m);
 glm::dvec3 unitOrZero(const glm::dvec3& v);
 
 }  // namespace dermis::reference

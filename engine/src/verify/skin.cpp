@@ -1,6 +1,7 @@
 #include "dermis/verify.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@
 #include "core/text.h"
 #include "dermis/mesh.h"
 #include "strict_floating_point.h"
+#include "verify/bank_error.h"
 #include "verify/bind_vertex.h"
 #include "verify/conditioning.h"
 #include "verify/methods.h"
@@ -66,12 +68,28 @@ Double3 toArray(const dvec3& v) {
   return {v.x, v.y, v.z};
 }
 
-}  // namespace
+/// `errors` is empty unless the joints are those of a bank.
+VertexBounds boundsOf(const VertexToSkin& vertex, std::span<const JointError> errors, Method method,
+                      Conditioning& conditioning) {
+  if (errors.empty() || vertex.influences.empty()) return boundsOf(method, conditioning);
+  const BankError error = bankError(vertex, errors, method, conditioning);
+  VertexBounds bounds = boundsOf(method, conditioning);
+  bounds.position += error.position;
+  // Above the range of float32 the bank may have anything.
+  if (!std::isfinite(bounds.position)) bounds.onlyFinite = bounds.outOfRange = true;
+  const auto add = [](double& bound, double more) {
+    bound = bound < 0 || !std::isfinite(more) ? -1 : bound + more;
+  };
+  add(bounds.normal, error.normal);
+  add(bounds.tangent, error.tangent);
+  return bounds;
+}
 
-Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
+Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const Joint> joints,
+                             std::span<const JointError> errors, Method method,
                              std::span<const MorphWeight> morphs) {
-  const MeshReport report =
-      validate(mesh, static_cast<std::uint32_t>(std::min<std::size_t>(pose.size(), maxPoseJoints)));
+  const MeshReport report = validate(
+      mesh, static_cast<std::uint32_t>(std::min<std::size_t>(joints.size(), maxPoseJoints)));
   if (const Result<void> accepted = report.accepted(); !accepted) return accepted.error();
   if (method > allMethods.back()) {
     return Error{ErrorCode::invalidArgument, "the number " +
@@ -85,10 +103,6 @@ Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> 
   }
   const Result<std::vector<ActiveMorph>> active = activeMorphs(mesh, morphs);
   if (!active) return active.error();
-
-  std::vector<Joint> joints;
-  joints.reserve(pose.size());
-  for (const JointMatrix& matrix : pose) joints.push_back(takeApart(matrix));
 
   AnalyzedMesh skinned;
   skinned.positions.resize(mesh.vertexCount);
@@ -104,7 +118,7 @@ Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> 
     const VertexToSkin vertex{joints, influences, bindVertex(mesh, index, *active, conditioning),
                               methodInputs(mesh, index)};
     const BindVertex result = skinOrKeep(vertex, method, conditioning);
-    skinned.bounds[index] = boundsOf(method, conditioning);
+    skinned.bounds[index] = boundsOf(vertex, errors, method, conditioning);
     skinned.positions[index] = toArray(result.position);
     if (mesh.normals) skinned.normals[index] = toArray(result.normal);
     if (mesh.tangents) {
@@ -115,9 +129,46 @@ Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> 
   return skinned;
 }
 
+}  // namespace
+
+Result<AnalyzedMesh> analyze(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
+                             std::span<const MorphWeight> morphs) {
+  std::vector<Joint> joints;
+  joints.reserve(pose.size());
+  for (const JointMatrix& matrix : pose) joints.push_back(takeApart(matrix));
+  return analyze(mesh, joints, {}, method, morphs);
+}
+
 Result<SkinnedMesh> skin(const MeshView& mesh, std::span<const JointMatrix> pose, Method method,
                          std::span<const MorphWeight> morphs) {
   Result<AnalyzedMesh> analyzed = analyze(mesh, pose, method, morphs);
+  if (!analyzed) return analyzed.error();
+  return SkinnedMesh(std::move(*analyzed));
+}
+
+Result<SkinnedMesh> skin(const MeshView& mesh, const SampledPose& pose, Method method,
+                         std::span<const MorphWeight> morphs) {
+  if (pose.bounds.size() != pose.joints.size() || pose.inverseBind.size() != pose.joints.size()) {
+    return Error{ErrorCode::invalidArgument,
+                 "the pose has no bounds: samplePose needs the bank for them"};
+  }
+  if (method <= allMethods.back() && isForComparison(method)) {
+    std::string bounded;
+    for (const Method other : allMethods) {
+      if (isForComparison(other)) continue;
+      bounded += (bounded.empty() ? "" : ", ") + std::string(methodName(other));
+    }
+    return Error{ErrorCode::invalidArgument,
+                 std::string(methodName(method)) +
+                     " has no bounds for sampled poses; these have: " + bounded};
+  }
+  std::vector<Joint> joints;
+  std::vector<JointError> errors;
+  for (std::size_t joint = 0; joint < pose.joints.size(); ++joint) {
+    joints.push_back(takeApart(pose.joints[joint]));
+    errors.emplace_back(joints.back(), pose.inverseBind[joint], pose.bounds[joint]);
+  }
+  Result<AnalyzedMesh> analyzed = analyze(mesh, joints, errors, method, morphs);
   if (!analyzed) return analyzed.error();
   return SkinnedMesh(std::move(*analyzed));
 }
