@@ -13,9 +13,10 @@
 namespace dermis::cli {
 
 /// Packs the clips of a scene and verifies poses and morph weights of what figures play on the
-/// targets of the pool: nothing, each clip alone, and blends of up to four layers. Cases compare
-/// points or weights (`comparesVertices` is false). Nothing if there are no clips. Clips that
-/// cannot be packed are left out, with a sentence in `warnings`.
+/// targets of the pool: nothing, each clip alone, and blends of up to four layers. These cases
+/// compare points or weights (`comparesVertices` is false). Others compare the vertices that the
+/// target skins in these poses with those of the source's poses. Nothing if there are no clips.
+/// Clips that cannot be packed are left out, with a sentence in `warnings`.
 Result<std::vector<VerifiedCase>> verifyClips(samples::TargetPool& pool, const Scene& scene,
                                               samples::Coverage coverage,
                                               std::vector<std::string>& warnings);

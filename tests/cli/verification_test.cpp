@@ -268,10 +268,16 @@ TEST(VerificationTest, ClipsAreVerifiedAsScenesPlayThem) {
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
 
   std::map<std::string, std::set<std::string>> parts;  // by pose
+  std::set<std::string> skinnedPoses, skinnedBy;
   std::uint64_t points = 0;
   double worst = 0;
   const nlohmann::json report = nlohmann::json::parse(readText(json));
   for (const nlohmann::json& one : report.at("models")[0].at("cases")) {
+    if (one.at("variant") == "in the sampled pose") {
+      EXPECT_EQ(one.at("vertices"), 3) << one;
+      skinnedPoses.insert(one.at("pose").get<std::string>());
+      skinnedBy.insert(one.at("method").get<std::string>());
+    }
     if (one.at("method") != "clips") continue;
     EXPECT_GT(one.at("points").get<int>(), 0) << one;
     points += one.at("points").get<std::uint64_t>();
@@ -289,6 +295,8 @@ TEST(VerificationTest, ClipsAreVerifiedAsScenesPlayThem) {
         << pose;
   }
   EXPECT_EQ(parts.size(), 13u);
+  EXPECT_EQ(skinnedPoses.size(), 13u);
+  EXPECT_EQ(skinnedBy.size(), samples::CpuTarget().methods().size());
   EXPECT_GT(worst, 0);
   const std::string line = "passed  " + model + "  clips: 13 plays, " + std::to_string(points) +
                            " points and morph weights compared; worst ";
