@@ -71,7 +71,7 @@ class CClipsTest : public ::testing::Test {
   /// The pose that the reference samples is that of C++.
   static void expectPose(const dermis_sampled_clips& sampled,
                          const reference::SampledPose& expected) {
-    std::vector<double> joints(12 * expected.joints.size()), bounds(2 * expected.joints.size());
+    std::vector<double> joints(12 * expected.joints.size()), bounds(3 * expected.joints.size());
     expectOk(dermis_reference_pose(&sampled, 0, joints.data(), joints.size(), bounds.data(),
                                    bounds.size(), &error));
     EXPECT_TRUE(isSame(joints.data(), expected.joints.data(), 8 * joints.size()));
@@ -161,6 +161,43 @@ TEST_F(CClipsTest, EveryOptionIsThatOfCpp) {
   EXPECT_TRUE(isSame(joints.data(), pose.data(), sizeof(JointMatrix) * pose.size()));
   expectPose(sampledOf(bank, layers),
              must(reference::samplePose(skeleton, clips, spans, sameLayers, 0, &same)));
+
+  // A mesh that is skinned in the bank's pose.
+  const dermis_sampled_clips sampled = sampledOf(bank, layers);
+  dermis_posed_mesh posed = sized<dermis_posed_mesh>();
+  posed.mesh = primitive.mesh;
+  posed.method = DERMIS_METHOD_LINEAR;
+  posed.clips = &sampled;
+  const reference::SkinnedMesh inSource = must(reference::skin(
+      view.mesh(), must(reference::samplePose(skeleton, clips, spans, sameLayers, 0, &same)),
+      Method::linear));
+  std::vector<double> positions(3 * inSource.positions.size());
+  expectOk(dermis_reference_skin(&posed, positions.data(), positions.size(), nullptr, 0, nullptr, 0,
+                                 &error));
+  EXPECT_TRUE(isSame(positions.data(), inSource.positions.data(), 8 * positions.size()));
+  std::vector<float> stored;
+  for (const reference::Double3& position :
+       must(reference::skin(view.mesh(), pose, Method::linear)).positions)
+    stored.insert(stored.end(), {static_cast<float>(position[0]), static_cast<float>(position[1]),
+                                 static_cast<float>(position[2])});
+  dermis_skinned_view inBank = sized<dermis_skinned_view>();
+  inBank.vertex_count = static_cast<std::uint32_t>(inSource.positions.size());
+  inBank.positions = {stored.data(), 0, DERMIS_FORMAT_FLOAT32X3};
+  dermis_comparison comparison = sized<dermis_comparison>();
+  expectOk(dermis_compare(&posed, &inBank, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 1u);
+  EXPECT_GT(comparison.compared, 0u);
+  EXPECT_GT(comparison.largest_position_error, 1e-6) << "the bank is as exact as its source";
+  posed.skin = 1;
+  expectError(dermis_compare(&posed, &inBank, &comparison, &error), "skin 1 does not exist");
+  posed.skin = 0;
+  posed.joints = joints.data();
+  posed.joint_count = primitive.joint_count;
+  expectError(dermis_compare(&posed, &inBank, &comparison, &error), "there are joints and clips");
+  posed.clips = nullptr;
+  expectOk(dermis_compare(&posed, &inBank, &comparison, &error));
+  EXPECT_EQ(comparison.passed, 1u);
+
   expectError(
       dermis_sample_pose(bank, layers.data(), 2, 1, joints.data(), primitive.joint_count, &error),
       "there is no skin 1");
@@ -218,10 +255,10 @@ TEST_F(CClipsTest, WhatIsWrongForTheReferenceIsSaid) {
   const dermis_clips_source callers = source;
   dermis_sampled_clips sampled = right;
   const std::size_t count = same.jointCount(0);
-  std::vector<double> joints(12 * count, 7), bounds(2 * count, 7);
+  std::vector<double> joints(12 * count, 7), bounds(3 * count, 7);
   const auto refused = [&](const std::string& part, dermis_code code = DERMIS_INVALID_ARGUMENT) {
     expectError(dermis_reference_pose(&sampled, 0, joints.data(), 12 * count, bounds.data(),
-                                      2 * count, &error),
+                                      3 * count, &error),
                 part, code);
     EXPECT_EQ(joints[0], 7);
     EXPECT_EQ(bounds[0], 7);
@@ -252,7 +289,7 @@ TEST_F(CClipsTest, WhatIsWrongForTheReferenceIsSaid) {
               "skin 1 does not exist");
   expectError(
       dermis_reference_pose(&sampled, 0, joints.data(), 12 * count, bounds.data(), 1, &error),
-      "bounds have " + std::to_string(2 * count) + " numbers, not 1");
+      "bounds have " + std::to_string(3 * count) + " numbers, not 1");
   EXPECT_EQ(joints[0], 7);  // nothing is written if a count is wrong
   expectError(dermis_reference_weights(nullptr, 0, nullptr, 0, nullptr, 0, &error),
               "sampled is null");

@@ -21,6 +21,15 @@
 extern "C" {
 #endif
 
+// Layers of clips.
+typedef struct dermis_sampled_clips {
+  uint32_t size;
+  uint32_t layer_count;
+  const dermis_clips_source* source;  // required; its errors and meshes are ignored
+  const dermis_clip_layer* layers;
+  const void* bank;  // the blob that was made of the source, for bounds; null: none
+  size_t bank_byte_count;
+} dermis_sampled_clips;
 // A mesh in a pose. The reference always applies scale: for a pose that ignores it, pass joints
 // without. For previous positions, pass the joints of the frame before, and their places as
 // positions.
@@ -28,10 +37,14 @@ typedef struct dermis_posed_mesh {
   uint32_t size;
   uint32_t joint_count;
   const dermis_mesh_view* mesh;  // required; one that `dermis_pack` accepts
-  const dermis_joint* joints;    // required
+  const dermis_joint* joints;    // required without `clips`
   const dermis_morph_weight* morphs;
   uint32_t morph_count;
   dermis_method method;
+  // In place of joints: the pose of this skin in the source of a bank, which is required. The
+  // bounds are those for vertices that a device skins in the bank's pose.
+  const dermis_sampled_clips* clips;
+  uint32_t skin;
 } dermis_posed_mesh;
 
 // Skins a mesh in double precision: 3 numbers for each position and normal, 4 for each tangent. The
@@ -79,19 +92,11 @@ DERMIS_COMPARE_API dermis_code dermis_compare(const dermis_posed_mesh* posed,
                                               const dermis_skinned_view* skinned,
                                               dermis_comparison* comparison, dermis_error* error);
 
-// Layers of clips. In the four functions below, arrays of double may be null, and their counts are
-// those of the numbers.
-typedef struct dermis_sampled_clips {
-  uint32_t size;
-  uint32_t layer_count;
-  const dermis_clips_source* source;  // required; its errors and meshes are ignored
-  const dermis_clip_layer* layers;
-  const void* bank;  // the blob that was made of the source, for bounds; null: none
-  size_t bank_byte_count;
-} dermis_sampled_clips;
-// Samples the pose of a skin in double precision: 12 numbers for each joint, 3 rows of 4. `bounds`
-// gets 2 numbers A and B for each joint: that of a bank moves a point p of bind space to at most
-// A + B d from where it moves here, where d is the length of inverse bind matrix × p.
+// In the four functions below, arrays of double may be null, and their counts are those of the
+// numbers. This one samples the pose of a skin in double precision: 12 numbers for each joint, 3
+// rows of 4. `bounds` gets 3 numbers A, B and C for each joint: that of a bank moves a point p of
+// bind space to at most A + B d from where it moves here, where d is the length of inverse bind
+// matrix × p; and except for a rotation, its 3×3 part is at most C from that here.
 DERMIS_COMPARE_API dermis_code dermis_reference_pose(const dermis_sampled_clips* sampled,
                                                      uint32_t skin, double* joints,
                                                      size_t joint_count, double* bounds,

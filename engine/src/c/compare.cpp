@@ -14,14 +14,6 @@ using namespace dermis::c;
 
 namespace {
 
-/// A mesh in a pose, skinned by the reference.
-reference::SkinnedMesh skin(const dermis_posed_mesh* callers) {
-  const dermis_posed_mesh posed = in(callers, "posed");
-  const View view(posed.mesh);
-  return must(reference::skin(view.mesh, jointsOf(posed.joints, posed.joint_count, "joints"),
-                              methodOf(posed.method), morphsOf(posed.morphs, posed.morph_count)));
-}
-
 /// Numbers for the caller, who may not want them.
 struct Numbers {
   template <typename Element>
@@ -47,13 +39,13 @@ void giveAll(std::initializer_list<Numbers> all) {
 
 /// Layers of clips of the caller.
 struct Sampled {
-  Sampled(const dermis_sampled_clips* callers, const double* bounds)
+  Sampled(const dermis_sampled_clips* callers, bool wantsBounds)
       : given(in(callers, "sampled")), source(in(given.source, "source")) {
     appendLayers(array(given.layers, given.layer_count, "layers"), layers);
     const auto bytes =
         array(static_cast<const std::byte*>(given.bank), given.bank_byte_count, "bank");
     if (given.bank != nullptr) bank.emplace(must(PackedClips::fromBytes(bytes)));
-    if (bounds != nullptr && !bank) fail("there is no bank, from which bounds follow");
+    if (wantsBounds && !bank) fail("there is no bank, from which bounds follow");
   }
   const PackedClips* bankOrNull() const { return bank ? &*bank : nullptr; }
   const RootMotionOptions* rootMotionOrNull() const {
@@ -65,6 +57,24 @@ struct Sampled {
   std::vector<ClipLayer> layers;
   std::optional<PackedClips> bank;
 };
+
+reference::SampledPose poseOf(const Sampled& from, std::uint32_t skin) {
+  return must(reference::samplePose(from.source.skeleton, from.source.clips, from.source.masks,
+                                    from.layers, skin, from.bankOrNull(), from.rootMotionOrNull()));
+}
+
+/// A mesh in a pose, skinned by the reference.
+reference::SkinnedMesh skin(const dermis_posed_mesh* callers) {
+  const dermis_posed_mesh posed = in(callers, "posed");
+  const View view(posed.mesh);
+  const Method method = methodOf(posed.method);
+  const auto morphs = morphsOf(posed.morphs, posed.morph_count);
+  const auto joints = jointsOf(posed.joints, posed.joint_count, "joints");
+  if (posed.clips == nullptr) return must(reference::skin(view.mesh, joints, method, morphs));
+  if (!joints.empty()) fail("there are joints and clips");
+  return must(
+      reference::skin(view.mesh, poseOf(Sampled(posed.clips, true), posed.skin), method, morphs));
+}
 
 SkinnedAttribute attributeOf(const dermis_skinned_attribute& attribute, std::uint32_t count) {
   const auto format = static_cast<VertexFormat>(
@@ -124,10 +134,8 @@ dermis_code dermis_reference_pose(const dermis_sampled_clips* sampled, uint32_t 
                                   double* joints, size_t joint_count, double* bounds,
                                   size_t bound_count, dermis_error* error) {
   return guarded(error, [&] {
-    const Sampled from(sampled, bounds);
-    const reference::SampledPose pose =
-        must(reference::samplePose(from.source.skeleton, from.source.clips, from.source.masks,
-                                   from.layers, skin, from.bankOrNull(), from.rootMotionOrNull()));
+    const Sampled from(sampled, bounds != nullptr);
+    const reference::SampledPose pose = poseOf(from, skin);
     giveAll({{pose.joints, joints, joint_count, "joints"},
              {pose.bounds, bounds, bound_count, "bounds"}});
   });
@@ -137,7 +145,7 @@ dermis_code dermis_reference_weights(const dermis_sampled_clips* sampled, uint32
                                      double* weights, size_t weight_count, double* bounds,
                                      size_t bound_count, dermis_error* error) {
   return guarded(error, [&] {
-    const Sampled from(sampled, bounds);
+    const Sampled from(sampled, bounds != nullptr);
     const reference::SampledWeights result =
         must(reference::sampleWeights(from.source.skeleton, from.source.clips, from.source.masks,
                                       from.layers, node, from.bankOrNull()));
@@ -150,7 +158,7 @@ dermis_code dermis_reference_motion(const dermis_sampled_clips* sampled, uint32_
                                     double to, uint32_t hold, double motion[4], double bounds[2],
                                     dermis_error* error) {
   return guarded(error, [&] {
-    const Sampled callers(sampled, bounds);
+    const Sampled callers(sampled, bounds != nullptr);
     const ClipsOfCaller& source = callers.source;
     if (!source.rootMotion) fail("the source has no root_motion_node");
     const reference::SampledMotion found =
