@@ -1,9 +1,41 @@
+// The buffers of a SceneRecorder.
+
 #include "vulkan/recorder/buffer.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <utility>
 
+#include "vulkan/recorder/state.h"
+
 namespace dermis::vulkan {
+namespace {
+
+const char* nameOf(BufferRole role) {
+  switch (role) {
+    case BufferRole::meshes:
+      return "dermis meshes";
+    case BufferRole::poses:
+      return "dermis poses";
+    case BufferRole::gpuPoses:
+      return "dermis GPU poses";
+    case BufferRole::palettes:
+      return "dermis palettes";
+    case BufferRole::results:
+      return "dermis results";
+    case BufferRole::history:
+      return "dermis history";
+    case BufferRole::tables:
+      return "dermis tables";
+    case BufferRole::readBack:
+      return "dermis read-back";
+    default:
+      return "dermis output";
+  }
+}
+
+}  // namespace
 
 Result<OwnBuffer> OwnBuffer::create(BufferSource& source, const Description& description) {
   VkBufferCreateInfo info{};
@@ -58,6 +90,49 @@ void OwnBuffer::release() {
     source_->callbacks.destroy(source_->callbacks.user, created_);
   source_->bytes -= size_;
   source_ = nullptr;
+}
+
+/// A range of the engine, or a new buffer.
+Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
+  BufferRange range;
+  void* mapped = nullptr;
+  if (wanted.role == BufferRole::meshes) range = description.meshes;
+  if (wanted.role == BufferRole::positions) range = description.output;
+  if (wanted.role == BufferRole::gpuPoses) range = description.gpuPoses;
+  if (wanted.role == BufferRole::poses) {
+    range = description.poses.range;
+    mapped = description.poses.mapped;
+  }
+  OwnBuffer own;
+  if (range.buffer != VK_NULL_HANDLE) {
+    range.size = wanted.requirement.size;  // whole objects, of which kernels can see all
+  } else {
+    VkBufferUsageFlags usage = wanted.requirement.usage;
+    if (wanted.role == BufferRole::positions) usage |= description.outputUsage;
+    const BufferUse use = !wanted.isMapped                      ? BufferUse::device
+                          : wanted.role == BufferRole::readBack ? BufferUse::readBack
+                                                                : BufferUse::upload;
+    Result<OwnBuffer> made =
+        OwnBuffer::create(source, {wanted.requirement.size, usage, use, nameOf(wanted.role)});
+    if (!made) return made.error();
+    own = std::move(*made);
+    range = own.range();
+    if (wanted.isMapped) mapped = own.bytes().data();
+  }
+  BoundBuffer buffer{range};
+  if (Result<void> made = createTexelView(*context, wanted.role, buffer); !made)
+    return made.error();
+  buffers.resize(std::max(buffers.size(), wanted.number + std::size_t{1}));
+  bound.resize(buffers.size());
+  buffers[wanted.number] = std::move(own);
+  bound[wanted.number] = buffer;
+  return mapped;
+}
+
+void SceneRecorder::State::releaseBuffer(std::uint32_t number) {
+  destroyTexelView(*context, bound[number]);
+  bound[number] = {};
+  buffers[number] = OwnBuffer();
 }
 
 }  // namespace dermis::vulkan

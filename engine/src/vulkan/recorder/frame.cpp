@@ -1,4 +1,4 @@
-// The commands of a frame.
+// Records the commands of a frame.
 
 #include <chrono>
 #include <string>
@@ -44,51 +44,55 @@ Result<void> SceneRecorder::State::makeStaging() {
   return {};
 }
 
-Result<void> SceneRecorder::State::recordFrame(VkCommandBuffer commandBuffer,
-                                               const FrameDescription& frame) {
+Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const FrameDescription& frame) {
+  State& state = *state_;
+  const ContextState& context = *state.context;
+  SceneBooks& books = state.books();
   const Stopwatch planning;
-  if (Result<void> planned = books().plan(plan); !planned) return planned;
-  if (!books().work_.culled.empty() && frame.visibility == VK_NULL_HANDLE) {
+  if (Result<void> planned = books.plan(state.plan); !planned) return planned;
+  if (!books.work_.culled.empty() && frame.visibility == VK_NULL_HANDLE) {
     return Error{ErrorCode::invalidArgument,
                  "FrameDescription::visibility is null, but there are instances that are culled on "
                  "the GPU"};
   }
-  const std::uint32_t alignment = context->limits.minStorageBufferOffsetAlignment;
+  const std::uint32_t alignment = context.limits.minStorageBufferOffsetAlignment;
   if (frame.visibilityOffset % alignment != 0) {
     return Error{ErrorCode::invalidArgument,
                  "FrameDescription::visibilityOffset is " + std::to_string(frame.visibilityOffset) +
                      ", but must be a multiple of " + std::to_string(alignment)};
   }
-  bound[visibilityBuffer].range = {frame.visibility, frame.visibilityOffset,
-                                   scene->visibilityCount() * VkDeviceSize{4}};
-  FrameSlot& own = slot();
+  state.bound[visibilityBuffer].range = {frame.visibility, frame.visibilityOffset,
+                                         state.scene->visibilityCount() * VkDeviceSize{4}};
+  FrameSlot& own = state.slot();
   own.sets.reset();
-  if (Result<void> good = context->check(plan, bound, own.sets, "SceneRecorder::prepare"); !good)
+  if (Result<void> good =
+          context.check(state.plan, state.bound, own.sets, "SceneRecorder::prepare");
+      !good)
     return good;
-  if (Result<void> made = makeStaging(); !made) return made;
+  if (Result<void> made = state.makeStaging(); !made) return made;
   const double planSeconds = planning.seconds();
 
   const Stopwatch recording;
-  statistics = {.gpuSeconds = statistics.gpuSeconds};
+  state.statistics = {.gpuSeconds = state.statistics.gpuSeconds};
   own.hasTimestamps = false;
-  if (!plan.commands().empty()) {
-    const Label label(context->table, commandBuffer, "dermis: skin a frame");
-    timestamps.begin(commandBuffer, slotNumber());
+  if (!state.plan.commands().empty()) {
+    const Label label(context.table, commandBuffer, "dermis: skin a frame");
+    state.timestamps.begin(commandBuffer, state.slotNumber());
     Staging staging{own.staging.handle(), own.staging.bytes()};
     const Recorded recorded =
-        recordCommands(commandBuffer, *context, plan, bound, own.sets, &staging);
-    timestamps.end(commandBuffer, slotNumber());
-    own.hasTimestamps = timestamps.isCreated();
-    statistics.dispatches = recorded.dispatches;
-    statistics.workgroups = recorded.workgroups;
-    statistics.copies = recorded.copies;
-    statistics.uploadedBytes = staging.used + books().planned_.poseBytes;
+        recordCommands(commandBuffer, context, state.plan, state.bound, own.sets, &staging);
+    state.timestamps.end(commandBuffer, state.slotNumber());
+    own.hasTimestamps = state.timestamps.isCreated();
+    state.statistics.dispatches = recorded.dispatches;
+    state.statistics.workgroups = recorded.workgroups;
+    state.statistics.copies = recorded.copies;
+    state.statistics.uploadedBytes = staging.used + books.planned_.poseBytes;
   }
-  own.frame = scene->frame();
-  if (Result<void> committed = books().commit(); !committed) return committed;
-  ++recordCount;
-  statistics.planSeconds = planSeconds;
-  statistics.recordSeconds = recording.seconds();
+  own.frame = state.scene->frame();
+  if (Result<void> committed = books.commit(); !committed) return committed;
+  ++state.recordCount;
+  state.statistics.planSeconds = planSeconds;
+  state.statistics.recordSeconds = recording.seconds();
   return {};
 }
 

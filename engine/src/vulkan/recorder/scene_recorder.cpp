@@ -1,4 +1,4 @@
-// The interface of SceneRecorder, and its buffers.
+// The interface of SceneRecorder, except `record`.
 
 #include "dermis/vulkan/scene_recorder.h"
 
@@ -70,29 +70,6 @@ SceneSetup setupOf(const SceneRecorderDescription& description, const ContextSta
   fix(setup.scene.gpuJointCapacity, description.gpuPoses, joint, 1);
   fix(setup.scene.outputCapacity, description.output, 1, 1);
   return setup;
-}
-
-const char* nameOf(BufferRole role) {
-  switch (role) {
-    case BufferRole::meshes:
-      return "dermis meshes";
-    case BufferRole::poses:
-      return "dermis poses";
-    case BufferRole::gpuPoses:
-      return "dermis GPU poses";
-    case BufferRole::palettes:
-      return "dermis palettes";
-    case BufferRole::results:
-      return "dermis results";
-    case BufferRole::history:
-      return "dermis history";
-    case BufferRole::tables:
-      return "dermis tables";
-    case BufferRole::readBack:
-      return "dermis read-back";
-    default:
-      return "dermis output";
-  }
 }
 
 }  // namespace
@@ -190,10 +167,6 @@ Result<void> SceneRecorder::prepare(const InstanceDescription& instance) const {
   return state_->context->prepare(*needs, state_->books().tuning_);
 }
 
-Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const FrameDescription& frame) {
-  return state_->recordFrame(commandBuffer, frame);
-}
-
 VkBuffer SceneRecorder::outputBuffer() const {
   return state_->bound[state_->books().output_].range.buffer;
 }
@@ -222,49 +195,6 @@ RecorderStatistics SceneRecorder::statistics() const {
   statistics.deviceMemory =
       state_->blocks != nullptr ? state_->blocks->bytes() : state_->source.bytes;
   return statistics;
-}
-
-/// A range of the engine, or a new buffer.
-Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
-  BufferRange range;
-  void* mapped = nullptr;
-  if (wanted.role == BufferRole::meshes) range = description.meshes;
-  if (wanted.role == BufferRole::positions) range = description.output;
-  if (wanted.role == BufferRole::gpuPoses) range = description.gpuPoses;
-  if (wanted.role == BufferRole::poses) {
-    range = description.poses.range;
-    mapped = description.poses.mapped;
-  }
-  OwnBuffer own;
-  if (range.buffer != VK_NULL_HANDLE) {
-    range.size = wanted.requirement.size;  // whole objects, of which kernels can see all
-  } else {
-    VkBufferUsageFlags usage = wanted.requirement.usage;
-    if (wanted.role == BufferRole::positions) usage |= description.outputUsage;
-    const BufferUse use = !wanted.isMapped                      ? BufferUse::device
-                          : wanted.role == BufferRole::readBack ? BufferUse::readBack
-                                                                : BufferUse::upload;
-    Result<OwnBuffer> made =
-        OwnBuffer::create(source, {wanted.requirement.size, usage, use, nameOf(wanted.role)});
-    if (!made) return made.error();
-    own = std::move(*made);
-    range = own.range();
-    if (wanted.isMapped) mapped = own.bytes().data();
-  }
-  BoundBuffer buffer{range};
-  if (Result<void> made = createTexelView(*context, wanted.role, buffer); !made)
-    return made.error();
-  buffers.resize(std::max(buffers.size(), wanted.number + std::size_t{1}));
-  bound.resize(buffers.size());
-  buffers[wanted.number] = std::move(own);
-  bound[wanted.number] = buffer;
-  return mapped;
-}
-
-void SceneRecorder::State::releaseBuffer(std::uint32_t number) {
-  destroyTexelView(*context, bound[number]);
-  bound[number] = {};
-  buffers[number] = OwnBuffer();
 }
 
 /// Reads the GPU time of the newest complete frame, and frees what complete frames uploaded.

@@ -31,7 +31,6 @@ struct SceneRecorder::State {
   void releaseBuffer(std::uint32_t number);
   Result<BufferRange> rangeOf(const Result<BufferPart>& part) const;
   void frameBegun(std::uint64_t completedFrame);
-  Result<void> recordFrame(VkCommandBuffer commandBuffer, const FrameDescription& frame);
   Result<void> makeStaging();
   SceneBooks& books() const { return SceneAccess::books(*scene); }
 
