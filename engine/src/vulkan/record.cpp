@@ -1,90 +1,148 @@
+// How a command is recorded, with its descriptors.
+
 #include <algorithm>
 #include <array>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <variant>
 
+#include "abi.h"
 #include "dermis/vulkan/context.h"
 #include "plan/variant.h"
-#include "vulkan/descriptor_writes.h"
 #include "vulkan/state.h"
 
 namespace dermis::vulkan {
 namespace {
 
-Result<void> checkBuffer(const Plan& plan, BufferRole role, const BufferRange& range,
-                         const char* name) {
-  const std::uint64_t needed = plan.buffer(role).size;
-  const std::uint64_t given = range.buffer == VK_NULL_HANDLE ? 0 : range.size;
-  if (given >= needed) return {};
-  return Error{ErrorCode::invalidArgument, std::string("the plan needs ") + std::to_string(needed) +
-                                               " bytes of " + name + ", but the bindings have " +
-                                               std::to_string(given)};
-}
+/// The descriptor writes of one kernel, for a set or to push.
+class DescriptorWrites {
+ public:
+  /// Bindings without a buffer are left out: the kernel's module does not declare them, or the
+  /// kernel is not recorded. `bound` must outlive this object.
+  explicit DescriptorWrites(const Descriptors& bound, VkDescriptorSet set = VK_NULL_HANDLE) {
+    for (std::uint32_t binding = 0; binding < bound.buffers.size(); ++binding) {
+      if (bound.buffers[binding].buffer == VK_NULL_HANDLE) continue;
+      add(set, binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER).pBufferInfo = &bound.buffers[binding];
+    }
+    for (std::uint32_t index = 0; index < bound.texels.size(); ++index) {
+      if (bound.texels[index] == VK_NULL_HANDLE) continue;
+      add(set, abi::BINDING_COUNT + index, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER)
+          .pTexelBufferView = &bound.texels[index];
+    }
+  }
+
+  std::uint32_t count() const { return count_; }
+  const VkWriteDescriptorSet* data() const { return writes_.data(); }
+
+ private:
+  VkWriteDescriptorSet& add(VkDescriptorSet set, std::uint32_t binding, VkDescriptorType type) {
+    VkWriteDescriptorSet& write = writes_[count_++];
+    write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+    write.dstSet = set;
+    write.dstBinding = binding;
+    write.descriptorCount = 1;
+    write.descriptorType = type;
+    return write;
+  }
+
+  std::array<VkWriteDescriptorSet, abi::BINDING_COUNT + abi::TEXEL_BINDING_COUNT> writes_{};
+  std::uint32_t count_ = 0;
+};
 
 }  // namespace
 
-Result<void> BindingsState::checkBuffers(const Plan& plan) const {
-  for (const auto& [role, range, name] : {std::tuple{BufferRole::meshes, &buffers.meshes, "meshes"},
-                                          {BufferRole::poses, &buffers.poses, "poses"},
-                                          {BufferRole::tables, &buffers.tables, "tables"},
-                                          {BufferRole::palettes, &buffers.palettes, "palettes"},
-                                          {BufferRole::results, &buffers.results, "results"}}) {
-    if (Result<void> good = checkBuffer(plan, role, *range, name); !good) return good;
-  }
-  static constexpr std::array<std::pair<BufferRole, const char*>, streamCount> outputs{
-      {{BufferRole::positions, "positions"},
-       {BufferRole::normals, "normals"},
-       {BufferRole::tangents, "tangents"},
-       {BufferRole::previousPositions, "previous positions"}}};
-  for (std::size_t stream = 0; stream < streamCount; ++stream) {
-    const bool isWritten = std::ranges::any_of(plan.pipelines(), [&](PipelineId id) {
-      const Variant variant = variantOf(id);
-      return variant.kernel == Kernel::skin && writesStream(variant, stream);
-    });
-    if (!isWritten) continue;
-    if (Result<void> good = checkBuffer(plan, outputs[stream].first, buffers.outputs[stream],
-                                        outputs[stream].second);
-        !good)
-      return good;
-  }
-  return {};
-}
-
-/// Variants that store attributes together write them through the binding of one of them.
-Result<void> BindingsState::checkOneBuffer(const Plan& plan) const {
-  const BufferRange& positions = buffers.outputs[Stream::positions];
-  for (const PipelineId id : plan.pipelines()) {
-    const Variant variant = variantOf(id);
-    if (variant.kernel != Kernel::skin ||
-        !(variant.pairs || variant.recordBytes != 0 ||
-          shareWords(variant.positions, variant.normals, variant.tangents)))
+Descriptors::Descriptors(const ContextState& context, const DispatchCommand& dispatch,
+                         const BoundBuffers& bound) {
+  for (const Binding& binding : dispatch.bindings) {
+    const BoundBuffer& buffer = bound[binding.part.buffer];
+    if (binding.isTexelBuffer) {
+      texels[binding.slot - abi::BINDING_COUNT] = buffer.view;
       continue;
-    for (const auto& [format, range, name] :
-         {std::tuple{variant.normals, &buffers.outputs[Stream::normals], "normals"},
-          {variant.tangents, &buffers.outputs[Stream::tangents], "tangents"}}) {
-      if (format == VertexFormat::none ||
-          (range->buffer == positions.buffer && range->offset == positions.offset))
-        continue;
-      return Error{ErrorCode::invalidArgument,
-                   std::string("the plan was made for outputs in one buffer, but the bindings have "
-                               "positions and ") +
-                       name + " in two"};
     }
+    const std::uint64_t size = buffer.range.size - binding.part.offset;
+    buffers[binding.slot] = {buffer.range.buffer, buffer.range.offset + binding.part.offset,
+                             std::min(size, context.limits.maxStorageBufferRange)};
   }
+}
+
+DescriptorSets::~DescriptorSets() {
+  for (const Pool& pool : pools_)
+    context->table.destroyDescriptorPool(context->device, pool.pool, context->allocator);
+}
+
+DescriptorSets::DescriptorSets(DescriptorSets&& other) noexcept
+    : context(other.context), pools_(std::move(other.pools_)), made_(std::move(other.made_)) {}
+
+Result<void> DescriptorSets::addPool(std::uint32_t count) {
+  const std::array<VkDescriptorPoolSize, 2> sizes{
+      {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, count * context->bindingCount()},
+       {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, count * context->texelBindingCount()}}};
+  VkDescriptorPoolCreateInfo poolInfo{};
+  poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  poolInfo.maxSets = count;
+  poolInfo.poolSizeCount = context->texelBindingCount() != 0 ? 2 : 1;
+  poolInfo.pPoolSizes = sizes.data();
+  VkDescriptorPool pool = VK_NULL_HANDLE;
+  if (const VkResult result = context->table.createDescriptorPool(context->device, &poolInfo,
+                                                                  context->allocator, &pool);
+      result != VK_SUCCESS)
+    return vulkanError("vkCreateDescriptorPool", result);
+  nameObject(context->table, context->device, VK_OBJECT_TYPE_DESCRIPTOR_POOL, pool, "dermis");
+  pools_.push_back({pool, count, count});
   return {};
 }
 
-Result<void> BindingsState::check(const Plan& plan) const {
-  if (Result<void> good = checkBuffers(plan); !good) return good;
-  if (!plan.commands().empty() && plan.limits() != context->limits) {
-    return Error{
-        ErrorCode::invalidArgument,
-        "the plan was made for the limits of another device; pass Context::limits() to makePlan"};
+VkDescriptorSet DescriptorSets::findMade(const Descriptors& descriptors) const {
+  const auto isSame = [&](const Made& made) {
+    const auto areEqual = [](const VkDescriptorBufferInfo& a, const VkDescriptorBufferInfo& b) {
+      return a.buffer == b.buffer && a.offset == b.offset && a.range == b.range;
+    };
+    return made.descriptors.texels == descriptors.texels &&
+           std::ranges::equal(made.descriptors.buffers, descriptors.buffers, areEqual);
+  };
+  const auto found = std::ranges::find_if(made_, isSame);
+  return found == made_.end() ? VK_NULL_HANDLE : found->set;
+}
+
+VkDescriptorSet DescriptorSets::find(const Descriptors& descriptors) const {
+  const std::scoped_lock lock(mutex_);
+  return findMade(descriptors);
+}
+
+Result<void> DescriptorSets::make(const Descriptors& descriptors) {
+  const std::scoped_lock lock(mutex_);
+  if (findMade(descriptors) != VK_NULL_HANDLE) return {};
+  auto pool = std::ranges::find_if(pools_, [](const Pool& one) { return one.left != 0; });
+  if (pool == pools_.end()) {
+    const auto count = static_cast<std::uint32_t>(std::max<std::size_t>(made_.size(), 4));
+    if (Result<void> added = addPool(count); !added) return added;
+    pool = pools_.end() - 1;
   }
-  if (Result<void> good = checkOneBuffer(plan); !good) return good;
-  return context->check(plan, bound, sets, "Context::prepare");
+  VkDescriptorSetAllocateInfo allocateInfo{};
+  allocateInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  allocateInfo.descriptorPool = pool->pool;
+  allocateInfo.descriptorSetCount = 1;
+  allocateInfo.pSetLayouts = &context->setLayout;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  if (const VkResult result =
+          context->table.allocateDescriptorSets(context->device, &allocateInfo, &set);
+      result != VK_SUCCESS)
+    return vulkanError("vkAllocateDescriptorSets", result);
+  --pool->left;
+  const DescriptorWrites writes(descriptors, set);
+  if (writes.count() != 0) {
+    context->table.updateDescriptorSets(context->device, writes.count(), writes.data(), 0, nullptr);
+  }
+  made_.push_back({descriptors, set});
+  return {};
+}
+
+void DescriptorSets::reset() {
+  for (Pool& pool : pools_) {
+    context->table.resetDescriptorPool(context->device, pool.pool, 0);
+    pool.left = pool.count;
+  }
+  made_.clear();
 }
 
 Result<void> ContextState::check(const Plan& plan, const BoundBuffers& buffers,
