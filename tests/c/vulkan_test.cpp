@@ -52,8 +52,7 @@ TEST_F(CVulkanTest, LimitsAndTuningAreThoseOfCpp) {
     Owned<dermis_context> made;
     expectOk(dermis_context_create(&desc, &limits, &tuning, &made, &error));
     vulkan::DeviceDescription same = mock.description();
-    same.enabledFeatureBits =
-        vulkan::DeviceFeature::scalarBlockLayout | vulkan::DeviceFeature::shaderInt64;
+    same.hasScalarBlockLayout = same.hasShaderInt64 = true;
     if (choice != DERMIS_CHOICE_DEFAULT)
       same.stagedStores = same.texelBuffers = choice == DERMIS_CHOICE_YES;
     const vulkan::Context expected = must(vulkan::Context::create(same));

@@ -114,23 +114,23 @@ TEST_F(MockTexelTest, NeedScalarBlockLayoutFromOneOfItsStructuresAndIntegersOf64
   EXPECT_FALSE(has());
 }
 
-TEST_F(MockTexelTest, FeaturesMayBeStatedAsBitsAsAChainOrHalfAndHalf) {
-  using enum vulkan::DeviceFeature;
+TEST_F(MockTexelTest, FeaturesMayBeStatedOneByOneAsAChainOrHalfAndHalf) {
   VkPhysicalDeviceFeatures2 integers{};
   integers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
   integers.features.shaderInt64 = VK_TRUE;
   vulkan::DeviceDescription description = mock.description();
   description.texelBuffers = true;
-  const auto has = [&](const void* chain, vulkan::DeviceFeature bits) {
+  const auto has = [&](const void* chain, bool scalarBlockLayout, bool shaderInt64) {
     description.enabledFeatures = chain;
-    description.enabledFeatureBits = bits;
+    description.hasScalarBlockLayout = scalarBlockLayout;
+    description.hasShaderInt64 = shaderInt64;
     return vulkan::Context::create(description)->limits().texelBuffers;
   };
-  EXPECT_TRUE(has(nullptr, scalarBlockLayout | shaderInt64));
-  EXPECT_FALSE(has(nullptr, scalarBlockLayout));
-  EXPECT_FALSE(has(nullptr, shaderInt64));
-  EXPECT_FALSE(has(&integers, none));
-  EXPECT_TRUE(has(&integers, scalarBlockLayout)) << "both together";
+  EXPECT_TRUE(has(nullptr, true, true));
+  EXPECT_FALSE(has(nullptr, true, false));
+  EXPECT_FALSE(has(nullptr, false, true));
+  EXPECT_FALSE(has(&integers, false, false));
+  EXPECT_TRUE(has(&integers, true, false)) << "both together";
 }
 
 TEST_F(MockTexelTest, AnEngineWithoutThatUsageGetsStorageBuffersOnly) {

@@ -145,11 +145,8 @@ dermis_code dermis_context_create(const dermis_device_desc* callers, dermis_limi
     device.apiVersion = desc.api_version;
     device.enabledExtensions = array(desc.extensions, desc.extension_count, "extensions");
     device.enabledFeatures = desc.features;
-    if (desc.has_scalar_block_layout != 0)
-      device.enabledFeatureBits =
-          device.enabledFeatureBits | vulkan::DeviceFeature::scalarBlockLayout;
-    if (desc.has_shader_int64 != 0)
-      device.enabledFeatureBits = device.enabledFeatureBits | vulkan::DeviceFeature::shaderInt64;
+    device.hasScalarBlockLayout = desc.has_scalar_block_layout != 0;
+    device.hasShaderInt64 = desc.has_shader_int64 != 0;
     device.texelBuffers = choiceOf(desc.texel_buffers, "texel_buffers");
     device.stagedStores = choiceOf(desc.staged_stores, "staged_stores");
     if (desc.get_kernel != nullptr) {

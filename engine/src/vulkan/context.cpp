@@ -41,11 +41,9 @@ struct CpuDeviceFeatures {
   bool scalarBlockLayout = false, shaderInt64 = false;
 };
 
-/// Reads the features that Dermis uses from the bits and the pNext chain.
+/// The features that Dermis uses, as they are stated one by one or in the pNext chain.
 CpuDeviceFeatures readFeatures(const DeviceDescription& description) {
-  const DeviceFeature bits = description.enabledFeatureBits;
-  CpuDeviceFeatures features{includes(bits, DeviceFeature::scalarBlockLayout),
-                             includes(bits, DeviceFeature::shaderInt64)};
+  CpuDeviceFeatures features{description.hasScalarBlockLayout, description.hasShaderInt64};
   for (const auto* next = static_cast<const VkBaseInStructure*>(description.enabledFeatures);
        next != nullptr; next = next->pNext) {
     switch (next->sType) {

@@ -191,24 +191,6 @@ struct KernelModule {
 
 // ---- The context.
 
-/// The features that Dermis uses if the engine enabled them on its device. A bit mask: combine them
-/// by `|`.
-enum class DeviceFeature : std::uint32_t {
-  none = 0,
-  /// Of VkPhysicalDeviceScalarBlockLayoutFeatures or VkPhysicalDeviceVulkan12Features.
-  scalarBlockLayout = 1,
-  shaderInt64 = 2,  ///< of VkPhysicalDeviceFeatures
-};
-
-/// Both masks together.
-constexpr DeviceFeature operator|(DeviceFeature a, DeviceFeature b) {
-  return static_cast<DeviceFeature>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
-}
-/// Whether `mask` includes `one`.
-constexpr bool includes(DeviceFeature mask, DeviceFeature one) {
-  return (static_cast<std::uint32_t>(mask) & static_cast<std::uint32_t>(one)) != 0;
-}
-
 /// The engine's device and what the engine enabled on it. Dermis uses nothing else. The engine owns
 /// all of it.
 struct DeviceDescription {
@@ -234,9 +216,9 @@ struct DeviceDescription {
   ///
   /// Only `Context::create` reads the chain.
   const void* enabledFeatures = nullptr;
-  /// `scalarBlockLayout` and `shaderInt64` as bits, for engines that do not have the chain. A
-  /// feature counts as enabled if it is in the chain or here.
-  DeviceFeature enabledFeatureBits = DeviceFeature::none;
+  /// Whether these features are enabled, for engines that do not have the chain. A feature counts
+  /// as enabled if it is in the chain or here.
+  bool hasScalarBlockLayout = false, hasShaderInt64 = false;
   /// Whether kernels are those for CPU devices, if the device supports them and the engine enabled
   /// `scalarBlockLayout` and `shaderInt64` (`DeviceLimits::texelBuffers`). `Plan::buffer` then
   /// returns VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT for these buffers, and
