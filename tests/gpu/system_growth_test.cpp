@@ -213,7 +213,8 @@ TEST_F(SystemGrowthTest, RangesOfTheEnginesBuffersAreAllThatIsUsed) {
     return BufferRange{heap.handle(), guard + number * (part + guard), part};
   };
   ranged.meshes = rangeOf(0);
-  ranged.poses = {rangeOf(1), heap.bytes().data() + rangeOf(1).offset};
+  ranged.poses = rangeOf(1);
+  ranged.mappedPoses = heap.bytes().data() + ranged.poses.offset;
   ranged.gpuPoses = rangeOf(2);
   ranged.output = rangeOf(3);
   ranged.scene.outputCapacity = Capacity::fixed(heap.bytes().size());  // what the test reads
@@ -300,9 +301,13 @@ TEST_F(SystemGrowthTest, RangesThatMakeNoSenseAreRefusedByName) {
   expectRefused("meshes ", [&](Description& d) { d.meshes = odd; });
   expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = odd; });
   expectRefused("gpuPoses ", [&](Description& d) { d.gpuPoses = {buffer.handle(), 0, 44}; });
-  expectRefused("poses.range ", [&](Description& d) { d.poses = {odd, buffer.bytes().data()}; });
-  expectRefused("poses ", [&](Description& d) { d.poses.range = good; });
-  expectRefused("poses ", [&](Description& d) { d.poses.mapped = buffer.bytes().data(); });
+  expectRefused("poses has 1026 bytes", [&](Description& d) {
+    d.poses = odd;
+    d.mappedPoses = buffer.bytes().data();
+  });
+  expectRefused("poses and mappedPoses ", [&](Description& d) { d.poses = good; });
+  expectRefused("poses and mappedPoses ",
+                [&](Description& d) { d.mappedPoses = buffer.bytes().data(); });
 }
 
 TEST_F(SystemGrowthTest, PosesThatOneCallAddsStandOneBehindTheOther) {

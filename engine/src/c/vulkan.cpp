@@ -102,7 +102,8 @@ vulkan::SceneRecorderDescription recorderOf(const dermis_recorder_desc& desc) {
   vulkan::SceneRecorderDescription result;
   result.scene = sceneOf(desc.scene);
   result.meshes = rangeOf(desc.meshes);
-  result.poses = {rangeOf(desc.poses), desc.mapped_poses};
+  result.poses = rangeOf(desc.poses);
+  result.mappedPoses = desc.mapped_poses;
   result.gpuPoses = rangeOf(desc.gpu_poses);
   result.output = rangeOf(desc.output);
   if (desc.output_usage != 0) result.outputUsage = desc.output_usage;

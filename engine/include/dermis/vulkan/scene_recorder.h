@@ -70,13 +70,6 @@ struct BufferCallbacks {
   void (*destroy)(void* user, const CreatedBuffer& buffer) = nullptr;
 };
 
-/// A part of a buffer that the CPU writes.
-struct MappedRange {
-  BufferRange range;
-  /// Address of the first byte of the range. The memory is host-coherent and stays mapped.
-  void* mapped = nullptr;
-};
-
 /// What `SceneRecorder::create` needs to know.
 struct SceneRecorderDescription {
   SceneDescription scene;
@@ -86,7 +79,9 @@ struct SceneRecorderDescription {
   // range does not grow: its size is the capacity, and that of `scene` is ignored. Dermis reads and
   // writes nothing outside the range. The engine destroys the buffer after the recorder.
   BufferRange meshes;
-  MappedRange poses;     ///< for poses that the CPU writes
+  BufferRange poses;  ///< for poses that the CPU writes
+  /// Address of the first byte of `poses`. The memory is host-coherent and stays mapped.
+  void* mappedPoses = nullptr;
   BufferRange gpuPoses;  ///< for poses that a GPU pass of the engine writes
   BufferRange output;
   /// What the engine uses the output buffer for, if the recorder creates it. For example

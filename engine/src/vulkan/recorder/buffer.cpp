@@ -100,8 +100,8 @@ Result<void*> SceneRecorder::State::createBuffer(const SceneBuffer& wanted) {
   if (wanted.role == BufferRole::positions) range = description.output;
   if (wanted.role == BufferRole::gpuPoses) range = description.gpuPoses;
   if (wanted.role == BufferRole::poses) {
-    range = description.poses.range;
-    mapped = description.poses.mapped;
+    range = description.poses;
+    mapped = description.mappedPoses;
   }
   OwnBuffer own;
   if (range.buffer != VK_NULL_HANDLE) {

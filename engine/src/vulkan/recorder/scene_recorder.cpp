@@ -41,15 +41,13 @@ Result<void> checkRanges(const SceneRecorderDescription& description, const Devi
   const std::uint32_t alignment = limits.minStorageBufferOffsetAlignment;
   for (const auto& [name, range, unit, multiple] :
        {std::tuple{"meshes", &description.meshes, std::uint64_t{packedMeshAlignment}, alignment},
-        {"poses.range", &description.poses.range, joint * description.scene.framesInFlight,
-         alignment},
+        {"poses", &description.poses, joint * description.scene.framesInFlight, alignment},
         {"gpuPoses", &description.gpuPoses, joint, alignment},
         {"output", &description.output, std::uint64_t{4}, outputRangeAlignment(limits)}}) {
     if (Result<void> good = checkRange(name, *range, unit, multiple); !good) return good;
   }
-  const MappedRange& poses = description.poses;
-  if ((poses.range.buffer == VK_NULL_HANDLE) != (poses.mapped == nullptr))
-    return wrongField("poses needs both a range and the address where it is mapped");
+  if ((description.poses.buffer == VK_NULL_HANDLE) != (description.mappedPoses == nullptr))
+    return wrongField("poses and mappedPoses must both be set, or neither");
   return {};
 }
 
@@ -66,7 +64,7 @@ SceneSetup setupOf(const SceneRecorderDescription& description, const ContextSta
   // 0 frames in flight are refused by the scene.
   const std::uint64_t slots = std::max(setup.scene.framesInFlight, 1u);
   fix(setup.scene.meshCapacity, description.meshes, 1, packedMeshAlignment);
-  fix(setup.scene.jointCapacity, description.poses.range, joint * slots, 1);
+  fix(setup.scene.jointCapacity, description.poses, joint * slots, 1);
   fix(setup.scene.gpuJointCapacity, description.gpuPoses, joint, 1);
   fix(setup.scene.outputCapacity, description.output, 1, 1);
   return setup;
