@@ -375,7 +375,7 @@ class Crowd {
 
 /// Writes a word for each instance: its figure is visible or not. An engine's culling does it on
 /// the GPU. Here the CPU writes mapped memory before the submission, which needs no barrier.
-VkBuffer writeVisibility(Crowd& crowd, Device& device, MappedBuffer& buffer) {
+vulkan::BufferRange writeVisibility(Crowd& crowd, Device& device, MappedBuffer& buffer) {
   const std::uint64_t size = std::uint64_t{crowd.scene().visibilityCount()} * 4;
   if (buffer.bytes().size() < size)
     buffer = must(MappedBuffer::create(device, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
@@ -386,7 +386,7 @@ VkBuffer writeVisibility(Crowd& crowd, Device& device, MappedBuffer& buffer) {
       std::memcpy(buffer.bytes().data() + index * 4, &word, 4);
     }
   }
-  return buffer.handle();
+  return buffer.range();
 }
 
 // [crowd-frame]
@@ -397,14 +397,13 @@ void skinFrame(vulkan::SceneRecorder& recorder, Crowd& crowd, std::uint64_t fram
                MappedBuffer& visibility, const Options& options) {
   must(crowd.scene().beginFrame(frame, completedFrame));
   crowd.update(frame);
-  vulkan::FrameDescription description;
-  if (options.culledOnGpu)
-    description.visibility = writeVisibility(crowd, *open.device, visibility);
+  vulkan::BufferRange words;
+  if (options.culledOnGpu) words = writeVisibility(crowd, *open.device, visibility);
 
   // The check copies the vertices. An engine that draws in each frame uses `Use::vertexInput` in
   // both barriers.
   open.context.recordBarrier(commandBuffer, Use::copyRead, Use::dermis);
-  must(recorder.record(commandBuffer, description));
+  must(recorder.record(commandBuffer, words));
   const Use use = options.picture.empty() ? Use::copyRead : Use::copyRead | Use::vertexInput;
   open.context.recordBarrier(commandBuffer, Use::dermis, use);
 }

@@ -163,7 +163,7 @@ TEST_F(AllocationTest, WarmFramesAllocateNothing) {
         changes[i].updateInterval = 1 + i % 2;
       }
       expect(system->scene().change(changes).ok());
-      expect(system->record(commandBuffer, {words.handle(), 0}).ok());
+      expect(system->record(commandBuffer, words.range()).ok());
       if (isLost) expect(system->scene().abandonFrame(frame).ok());
       expect(system->scene().output(instances[3]).ok());
       expect(system->scene().bounds(instances[5]).ok());

@@ -106,7 +106,7 @@ class RigOnDevice : public ::testing::Test {
   }
   void runFrame() {
     begin();
-    engine().submit({.visibility = words_->handle()});
+    engine().submit(words_->range());
     hasBegun_ = false;
   }
 

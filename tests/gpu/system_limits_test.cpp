@@ -68,7 +68,7 @@ class SystemLimitsTest : public SystemTest {
     for (const std::uint32_t pose : {1u, 2u}) {
       if (pose != 1) engine.begin(1);
       engine.writePose(instance.pose, systemPose(pose));
-      engine.submit({words.handle(), 0});
+      engine.submit(words.range());
     }
     const std::vector<std::byte> bytes = engine.readOutput();
     const Streams expected = alone(meshes_[1], systemPose(2), instance);

@@ -36,7 +36,7 @@ class SystemMemoryTest : public SystemTest {
         engine.addInstance(instance);
       }
       engine.writePose(instance.pose, systemPose(2));
-      engine.submit({visibility.handle(), 0});
+      engine.submit(visibility.range());
     }
     engine.finish();
   }

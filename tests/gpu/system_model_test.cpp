@@ -80,7 +80,7 @@ class GpuModelTest : public SystemTest,
   }
   Result<void> trySubmit() override {
     showSome();
-    return engine_->trySubmit({nextWords().handle(), 0});
+    return engine_->trySubmit(nextWords().range());
   }
   void failAt(int call) override {
     log_->failsAt = call;
@@ -131,7 +131,7 @@ class GpuModelTest : public SystemTest,
   }
   void abandon() override {
     showSome();
-    engine_->abandon({nextWords().handle(), 0}, [this] { changeMeanwhile(); });
+    engine_->abandon(nextWords().range(), [this] { changeMeanwhile(); });
   }
   std::uint64_t outputNow() override { return engine_->recorder().outputGeneration(); }
   std::vector<JointMatrix> sampleAlone(std::uint32_t play, std::uint32_t skin) override {

@@ -127,7 +127,7 @@ TEST_F(SystemOverflowTest, NoVisibilityIndexReachesTheInstanceBudget) {
   samples::MappedBuffer words = must(samples::MappedBuffer::create(
       device(), small.scene.instanceCapacity.initial * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT));
   std::memset(words.bytes().data(), 1, words.bytes().size());
-  engine_->submit({words.handle(), 0});
+  engine_->submit(words.range());
   for (std::uint32_t i = 0; i < added.size(); ++i) expectPose(added[i], packed_, i, i);
   engine_.reset();
 }

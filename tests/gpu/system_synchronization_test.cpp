@@ -90,7 +90,7 @@ class BusyScene {
   void runFrame(std::uint32_t underWay = framesInFlight - 1) {
     engine_.begin(underWay);
     change();
-    engine_.submit({visibility_.handle(), 0});
+    engine_.submit(visibility_.range());
     mostUnderWay_ = std::max(mostUnderWay_, engine_.frame() - engine_.completedFrame());
   }
   SystemEngine& engine() { return engine_; }
@@ -248,7 +248,7 @@ class EventfulFrames {
       for (std::uint32_t i = 0; i < poses.size(); ++i)
         engine.writePose(poses[i], systemPose(frame + i));
       if (frame == 3) engine->compact(100'000);
-      engine.submit({words.handle(), 0});
+      engine.submit(words.range());
     }
     engine.finish();
     const bool isReported = countHazards(device.takeValidationMessages()) != 0;

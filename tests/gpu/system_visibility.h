@@ -53,8 +53,7 @@ class SystemVisibilityTest : public SystemTest {
       words_.bytes()[index * 4 + i % 4] = std::byte{1};  // any bit will do
     }
   }
-  vulkan::FrameDescription frame() const { return {words_.handle(), 0}; }
-  void submit() { engine_->submit(frame()); }
+  void submit() { engine_->submit(words_.range()); }
   void moveAll(std::uint32_t by) {
     for (std::uint32_t i = 0; i < instanceCount; ++i)
       engine_->writePose(palettes_[i], systemPose(i + by));

@@ -323,7 +323,7 @@ TEST_F(SystemVisibilityTest, ATeleportReachesWhatIsCulledOnTheGpu) {
 
 TEST_F(SystemVisibilityTest, CullingOnTheGpuNeedsTheWords) {
   open(true, motionLayout());
-  const Result<void> recorded = engine_->trySubmit({});
+  const Result<void> recorded = engine_->trySubmit();
   ASSERT_FALSE(recorded.ok());
   EXPECT_EQ(recorded.error().code, ErrorCode::invalidArgument);
   engine_->begin();

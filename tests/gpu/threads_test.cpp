@@ -378,7 +378,7 @@ TEST_F(ThreadsTest, ManyPrepareAndWritePosesOfASystem) {
   instance.culledOnGpu = true;
   instance.pose = palettes[3];
   const InstanceHandle culled = must(engine->addInstance(instance));
-  engine.submit({visibility.handle(), 0});
+  engine.submit(visibility.range());
   const std::vector<std::byte> bytes = engine.readOutput();
   EXPECT_EQ(engine.read(bytes, culled), engine.read(bytes, instances[3]));
 }

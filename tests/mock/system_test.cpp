@@ -60,7 +60,7 @@ class MockSystemTest : public MockContextTest {
     mock.copies.clear();
     mock.memoryBarriers.clear();
     mock.dispatches.clear();
-    must(system->record(commandBuffer, {visibility, 0}));
+    must(system->record(commandBuffer, {visibility, 0, scene().visibilityCount() * 4}));
   }
 
   PackedMesh packed = systemMesh(1, 40);
@@ -98,7 +98,7 @@ TEST_F(MockSystemTest, WhereABlockFindsNoMemoryABufferAloneDoes) {
   EXPECT_LT(mock.memoryBytes(), 128u << 10);
 }
 
-TEST_F(MockSystemTest, AMisalignedVisibilityBufferIsRefused) {
+TEST_F(MockSystemTest, AMisalignedOrSmallVisibilityBufferIsRefused) {
   ASSERT_NO_FATAL_FAILURE(create());
   make(small());
   InstanceDescription culled;
@@ -107,11 +107,17 @@ TEST_F(MockSystemTest, AMisalignedVisibilityBufferIsRefused) {
   begin();
   const std::uint32_t alignment = context->limits().minStorageBufferOffsetAlignment;
   ASSERT_GT(alignment, 4u);
-  const Result<void> refused = system->record(commandBuffer, {visibility, 4});
-  ASSERT_FALSE(refused.ok());
-  EXPECT_NE(refused.error().message.find("visibilityOffset is 4"), std::string::npos);
+  const std::uint64_t size = scene().visibilityCount() * 4;
+  const auto expectRefused = [&](const vulkan::BufferRange& range, const std::string& message) {
+    const Result<void> refused = system->record(commandBuffer, range);
+    ASSERT_FALSE(refused.ok()) << message;
+    EXPECT_NE(refused.error().message.find(message), std::string::npos) << refused.error().message;
+  };
+  expectRefused({visibility, 4, size}, "visibility.offset is 4,");
+  expectRefused({visibility, alignment, size - 4}, "visibility has " + std::to_string(size - 4));
+  expectRefused({VK_NULL_HANDLE, 0, size}, "visibility has 0");
   EXPECT_TRUE(mock.commands.empty());
-  must(system->record(commandBuffer, {visibility, alignment}));
+  must(system->record(commandBuffer, {visibility, alignment, size}));
 }
 
 /// A GPU in a PC: device memory, host memory, a little that is both, and a type that needs a

@@ -112,19 +112,19 @@ void SystemEngine::begin(std::uint32_t underWay) {
 }
 
 Result<void> SystemEngine::recordFrame(VkCommandBuffer commandBuffer,
-                                       const vulkan::FrameDescription& frame) {
+                                       const vulkan::BufferRange& visibility) {
   if (beforeRecord) beforeRecord(commandBuffer);
   writeGpuPoses(commandBuffer);
   if (recordsBarriers) recordBarrier(commandBuffer, Use::copyRead, Use::dermis);
-  const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, frame)
-                                                 : recorder_.record(commandBuffer, frame);
+  const Result<void> recorded = recordsSecondary ? recordInSecondary(commandBuffer, visibility)
+                                                 : recorder_.record(commandBuffer, visibility);
   if (recordsBarriers) recordBarrier(commandBuffer, Use::dermis, Use::copyRead);
   if (afterRecord) afterRecord(commandBuffer);
   return recorded;
 }
 
 Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
-                                             const vulkan::FrameDescription& frame) {
+                                             const vulkan::BufferRange& visibility) {
   const VkCommandBuffer secondary =
       device_.allocateCommandBuffer(VK_COMMAND_BUFFER_LEVEL_SECONDARY);
   secondaries_.push_back(secondary);
@@ -135,25 +135,25 @@ Result<void> SystemEngine::recordInSecondary(VkCommandBuffer primary,
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   begin.pInheritanceInfo = &inheritance;
   device_.functions().BeginCommandBuffer(secondary, &begin);
-  Result<void> recorded = recorder_.record(secondary, frame);
+  Result<void> recorded = recorder_.record(secondary, visibility);
   device_.functions().EndCommandBuffer(secondary);
   device_.functions().CmdExecuteCommands(primary, 1, &secondary);
   return recorded;
 }
 
-Result<void> SystemEngine::trySubmit(const vulkan::FrameDescription& frame) {
+Result<void> SystemEngine::trySubmit(const vulkan::BufferRange& visibility) {
   const VkCommandBuffer commandBuffer = beginCommands();
-  const Result<void> recorded = recordFrame(commandBuffer, frame);
+  const Result<void> recorded = recordFrame(commandBuffer, visibility);
   if (recorded && outputGrows_) outputSize_ = scene().statistics().outputs.capacity;
   if (recorded) gpuWrites_.clear();
   submitted_.push_back({frame_, submitCommands(commandBuffer), commandBuffer});
   return recorded;
 }
 
-void SystemEngine::abandon(const vulkan::FrameDescription& frame,
+void SystemEngine::abandon(const vulkan::BufferRange& visibility,
                            const std::function<void()>& meanwhile) {
   const VkCommandBuffer commandBuffer = beginCommands();
-  must(recordFrame(commandBuffer, frame));
+  must(recordFrame(commandBuffer, visibility));
   device_.functions().EndCommandBuffer(commandBuffer);
   device_.freeCommandBuffer(commandBuffer);
   meanwhile();

@@ -55,12 +55,12 @@ class SystemEngine {
   /// Begins the next one, once at most `underWay` of those before are not complete.
   void begin(std::uint32_t underWay = 0);
   /// Records it, with the engine's barriers around, and submits it.
-  void submit(const vulkan::FrameDescription& frame = {}) { must(trySubmit(frame)); }
+  void submit(const vulkan::BufferRange& visibility = {}) { must(trySubmit(visibility)); }
   /// Where `record` fails an empty command buffer is submitted.
-  Result<void> trySubmit(const vulkan::FrameDescription& frame = {});
+  Result<void> trySubmit(const vulkan::BufferRange& visibility = {});
   /// Records it, calls `meanwhile`, and says that it was not submitted.
   void abandon(
-      const vulkan::FrameDescription& frame = {}, const std::function<void()>& meanwhile = [] {});
+      const vulkan::BufferRange& visibility = {}, const std::function<void()>& meanwhile = [] {});
   void runFrame() {
     begin();
     submit();
@@ -111,8 +111,8 @@ class SystemEngine {
   std::vector<std::byte> readRange(const vulkan::BufferRange& range);
   void writeGpuPoses(VkCommandBuffer commandBuffer);
   VkCommandBuffer beginCommands();
-  Result<void> recordInSecondary(VkCommandBuffer primary, const vulkan::FrameDescription& frame);
-  Result<void> recordFrame(VkCommandBuffer commandBuffer, const vulkan::FrameDescription& frame);
+  Result<void> recordInSecondary(VkCommandBuffer primary, const vulkan::BufferRange& visibility);
+  Result<void> recordFrame(VkCommandBuffer commandBuffer, const vulkan::BufferRange& visibility);
   VkFence submitCommands(VkCommandBuffer commandBuffer);
   void waitFor(const SubmittedFrame& frame);
   void waitUntilUnderWay(std::uint32_t count);

@@ -295,9 +295,10 @@ dermis_code dermis_record(dermis_recorder* recorder, VkCommandBuffer command_buf
                           VkBuffer visibility, VkDeviceSize visibility_offset,
                           dermis_error* error) {
   return guarded(error, [&] {
-    dermis_recorder& lender = required(recorder, "recorder");
+    vulkan::SceneRecorder& target = *required(recorder, "recorder").recorder;
     required(command_buffer, "command_buffer");
-    must(lender.recorder->record(command_buffer, {visibility, visibility_offset}));
+    const VkDeviceSize words = target.scene().visibilityCount();
+    must(target.record(command_buffer, {visibility, visibility_offset, words * 4}));
   });
 }
 

@@ -101,19 +101,6 @@ struct SceneRecorderDescription {
   std::optional<Tuning> tuning;  ///< if empty: `Context::tuning`
 };
 
-/// What `SceneRecorder::record` needs to know.
-struct FrameDescription {
-  /// Required if instances are `culledOnGpu`: a buffer with VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that
-  /// holds `Scene::visibilityCount` words of 4 bytes. An instance is visible if the word at its
-  /// `visibilityIndex` is not 0. The engine's culling writes them on the GPU before `record`, with
-  /// the barrier `barrierBetween(Use::computeWrite, Use::dermis)` in between; or the CPU writes
-  /// them through a mapping before the submission, without a barrier, to a buffer that no frame in
-  /// flight uses.
-  VkBuffer visibility{};
-  /// Bytes; a multiple of `DeviceLimits::minStorageBufferOffsetAlignment`.
-  VkDeviceSize visibilityOffset = 0;
-};
-
 /// What `SceneRecorder::statistics` returns, besides `Scene::statistics`.
 struct RecorderStatistics {
   // -- Of the last `record`; zeros after `Scene::abandonFrame`.
@@ -181,16 +168,23 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// `poseRange` and `drivenRange` name, and after it the barrier between `Use::dermis` and the
   /// next use.
   ///
+  /// `visibility` is required if instances are `culledOnGpu`: a part of a buffer with
+  /// VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that holds `Scene::visibilityCount` words of 4 bytes. An
+  /// instance is visible if the word at its `visibilityIndex` is not 0. The engine's culling writes
+  /// them on the GPU before `record`, with the barrier `barrierBetween(Use::computeWrite,
+  /// Use::dermis)` in between; or the CPU writes them through a mapping before the submission,
+  /// without a barrier, to a buffer that no frame in flight uses.
+  ///
   /// Fails with
   /// - `notPrepared` if `prepare` was not called for such instances;
-  /// - `invalidArgument` if `beginFrame` was not called, or if instances are culled on the GPU and
-  ///   `FrameDescription::visibility` is null or its offset is misaligned;
+  /// - `invalidArgument` if `beginFrame` was not called, if the offset of `visibility` is not
+  ///   aligned, or if instances are culled on the GPU and it has fewer words;
   /// - `limitExceeded` if the tables are larger than a storage buffer range;
   /// - `vulkanError`, or the error of `BufferCallbacks::create`.
   ///
   /// If it fails, nothing is recorded, and the next `record` does all of the work. If the frame is
   /// not submitted, call `Scene::abandonFrame`.
-  Result<void> record(VkCommandBuffer commandBuffer, const FrameDescription& frame = {});
+  Result<void> record(VkCommandBuffer commandBuffer, const BufferRange& visibility = {});
 
   /// The buffer that holds all outputs as of the last `record`: one that the recorder created, or
   /// the buffer of `SceneRecorderDescription::output`. Offsets of outputs count from its beginning.

@@ -44,25 +44,26 @@ Result<void> SceneRecorder::State::makeStaging() {
   return {};
 }
 
-Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const FrameDescription& frame) {
+Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const BufferRange& visibility) {
   State& state = *state_;
   const ContextState& context = *state.context;
   SceneBooks& books = state.books();
   const Stopwatch planning;
   if (Result<void> planned = books.plan(state.plan); !planned) return planned;
-  if (!books.work_.culled.empty() && frame.visibility == VK_NULL_HANDLE) {
-    return Error{ErrorCode::invalidArgument,
-                 "FrameDescription::visibility is null, but there are instances that are culled on "
-                 "the GPU"};
-  }
   const std::uint32_t alignment = context.limits.minStorageBufferOffsetAlignment;
-  if (frame.visibilityOffset % alignment != 0) {
+  if (visibility.offset % alignment != 0) {
     return Error{ErrorCode::invalidArgument,
-                 "FrameDescription::visibilityOffset is " + std::to_string(frame.visibilityOffset) +
+                 "visibility.offset is " + std::to_string(visibility.offset) +
                      ", but must be a multiple of " + std::to_string(alignment)};
   }
-  state.bound[visibilityBuffer].range = {frame.visibility, frame.visibilityOffset,
-                                         state.scene->visibilityCount() * VkDeviceSize{4}};
+  const std::uint64_t needed = state.scene->visibilityCount() * VkDeviceSize{4};
+  const std::uint64_t given = visibility.buffer == VK_NULL_HANDLE ? 0 : visibility.size;
+  if (!books.work_.culled.empty() && given < needed) {
+    return Error{ErrorCode::invalidArgument,
+                 "instances that are culled on the GPU need " + std::to_string(needed) +
+                     " bytes of words, but visibility has " + std::to_string(given)};
+  }
+  state.bound[visibilityBuffer].range = {visibility.buffer, visibility.offset, needed};
   FrameSlot& own = state.slot();
   own.sets.reset();
   if (Result<void> good =
