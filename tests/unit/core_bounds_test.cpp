@@ -695,7 +695,7 @@ TEST(Bounds, GrowByWhatMorphTargetsDisplace) {
   targets[1].positionScale = {1, 2, 1};
   MeshView view = mesh.view();
   view.morphTargets = targets;
-  const std::array<MorphRange, 3> wide{MorphRange{-1, 2}, MorphRange{0.5f, 0.5f}, MorphRange{}};
+  const std::array<float, 2> wide[] = {{-1, 2}, {0.5f, 0.5f}, {0, 1}};
 
   for (const bool withRanges : {false, true}) {
     const Result<JointBounds> bounds =
@@ -730,14 +730,14 @@ TEST(Bounds, RefuseWhatPackRefuses) {
   EXPECT_EQ(jointBounds(mesh.view(), maxPoseJoints + 1).error().code, ErrorCode::invalidArgument);
   EXPECT_EQ(jointBounds(mesh.view(), 1).error().code, ErrorCode::invalidMesh);
   EXPECT_EQ(jointBounds(MeshView{}, 1).error().code, ErrorCode::invalidMesh);
-  const std::array one{MorphRange{}};
+  const std::array<float, 2> one[] = {{0, 1}};
   EXPECT_EQ(jointBounds(mesh.view(), 4, one).error().code, ErrorCode::invalidArgument);
 
   MorphTargetView target;
   MeshView view = mesh.view();
   view.morphTargets = {&target, 1};
   EXPECT_TRUE(jointBounds(view, 4).ok());  // displaces nothing
-  const std::array backward{MorphRange{1, 0}};
+  const std::array<float, 2> backward[] = {{1, 0}};
   EXPECT_EQ(jointBounds(view, 4, backward).error().code, ErrorCode::invalidArgument);
   const std::array<float, 3> displacement{1, 2, 3};
   target.positions = attributeView(displacement.data(), 1, 3);

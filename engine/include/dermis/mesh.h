@@ -432,24 +432,19 @@ class DERMIS_CORE_API JointBounds {
   std::unique_ptr<JointBoundsData> data_;
 };
 
-/// The range of weights that a morph target will have.
-struct MorphRange {
-  float min = 0;
-  float max = 1;
-};
-
 /// Collects what `skinnedBounds` needs to know about a mesh, for poses of `jointCount` joints.
 /// O(vertices × influences²).
 ///
-/// The boxes hold for all combinations of morph weights within `morphRanges`, which has one element
-/// for each morph target. If it is empty, all ranges are 0 to 1. For a mesh that is drawn without
-/// its morph targets, pass a view without them: the box is tighter.
+/// The boxes hold for all combinations of morph weights within `morphRanges`: the minimum and the
+/// maximum of the weight of each morph target. If it is empty, all ranges are 0 to 1. For a mesh
+/// that is drawn without its morph targets, pass a view without them: the box is tighter.
 ///
 /// Fails with `invalidMesh` if `pack` refuses the mesh or a morph target does not fit it. Fails
 /// with `invalidArgument` if `jointCount` is 0 or above `maxPoseJoints`, if a range is not finite
 /// or its minimum is above its maximum, or if the number of ranges is wrong.
-DERMIS_CORE_API Result<JointBounds> jointBounds(const MeshView& mesh, std::uint32_t jointCount,
-                                                std::span<const MorphRange> morphRanges = {});
+DERMIS_CORE_API Result<JointBounds> jointBounds(
+    const MeshView& mesh, std::uint32_t jointCount,
+    std::span<const std::array<float, 2>> morphRanges = {});
 
 /// A box that contains every position that the kernels or the reference compute for the mesh in
 /// this pose, including rounding errors. It is in the space of the pose. In ordinary poses it is a

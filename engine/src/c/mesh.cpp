@@ -1,5 +1,6 @@
 // Checking, repairing and packing meshes; centers of rotation; places of vertices.
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -56,7 +57,7 @@ dermis_code dermis_joint_bounds_create(const dermis_mesh_view* mesh, uint32_t jo
                                        dermis_joint_bounds** bounds, dermis_error* error) {
   return guarded(error, [&] {
     const View view(mesh);
-    std::vector<MorphRange> ranges;
+    std::vector<std::array<float, 2>> ranges;
     const auto numbers = array(morph_ranges, std::size_t{2} * range_count, "morph_ranges");
     for (std::size_t i = 0; i < numbers.size(); i += 2)
       ranges.push_back({numbers[i], numbers[i + 1]});

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -43,12 +44,15 @@ Error invalid(const MeshView& mesh, const std::string& what) {
   return {ErrorCode::invalidArgument, "mesh " + inQuotes(mesh.name) + what};
 }
 
+/// The minimum and the maximum of a morph weight.
+using MorphRange = std::array<float, 2>;
+
 /// Where each vertex may be, relative to its bind position; empty if nothing displaces it.
 class Displacements {
  public:
   Displacements(const MeshView& mesh, std::span<const MorphRange> ranges) {
     for (std::size_t target = 0; target < mesh.morphTargets.size(); ++target)
-      add(mesh, mesh.morphTargets[target], ranges.empty() ? MorphRange{} : ranges[target]);
+      add(mesh, mesh.morphTargets[target], ranges.empty() ? MorphRange{0, 1} : ranges[target]);
   }
 
   Range around(std::uint32_t vertex, const math::Vec3& position) const {
@@ -67,8 +71,8 @@ class Displacements {
         whole[static_cast<int>(i)] =
             loadStored(target.positions, element, i) * static_cast<double>(target.positionScale[i]);
       }
-      const math::Vec3 low = static_cast<double>(range.min) * whole;
-      const math::Vec3 high = static_cast<double>(range.max) * whole;
+      const math::Vec3 low = static_cast<double>(range[0]) * whole;
+      const math::Vec3 high = static_cast<double>(range[1]) * whole;
       ranges_[vertex] = ranges_[vertex] + Range{math::min(low, high), math::max(low, high)};
     }
   }
@@ -192,7 +196,7 @@ Result<void> checkRanges(const MeshView& mesh, std::span<const MorphRange> morph
                              std::to_string(mesh.morphTargets.size()) + " morph targets");
   }
   for (const MorphRange& range : morphRanges) {
-    if (!std::isfinite(range.min) || !std::isfinite(range.max) || range.min > range.max) {
+    if (!std::isfinite(range[0]) || !std::isfinite(range[1]) || range[0] > range[1]) {
       return invalid(mesh, ": a range of morph weights is not finite, or its min is above its max");
     }
   }
