@@ -135,12 +135,13 @@ constexpr VkMemoryPropertyFlags mappedMemory =
     VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
 
 // [callbacks]
-Result<vulkan::CreatedBuffer> createForDermis(void* user, const vulkan::BufferRequest& request) {
+Result<vulkan::CreatedBuffer> createForDermis(void* user, const VkBufferCreateInfo& info,
+                                              vulkan::BufferUse use, const char*) {
   vulkan::CreatedBuffer created;
   auto* allocation = new Allocation;
-  const VkMemoryPropertyFlags wanted = request.use == vulkan::BufferUse::device ? 0 : mappedMemory;
-  const VkResult result = static_cast<Allocator*>(user)->createBuffer(*request.info, wanted,
-                                                                      created.buffer, *allocation);
+  const VkMemoryPropertyFlags wanted = use == vulkan::BufferUse::device ? 0 : mappedMemory;
+  const VkResult result =
+      static_cast<Allocator*>(user)->createBuffer(info, wanted, created.buffer, *allocation);
   created.mapped = allocation->mapped;
   created.allocation = allocation;
   if (result == VK_SUCCESS) return created;

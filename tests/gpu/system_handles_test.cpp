@@ -304,7 +304,8 @@ TEST_F(SystemHandlesTest, RecordIsCalledOnceAFrame) {
 
 TEST_F(SystemHandlesTest, SystemsThatMakeNoSenseAreRefused) {
   using Change = std::function<void(SceneRecorderDescription&)>;
-  const auto create = [](void*, const vulkan::BufferRequest&) -> Result<vulkan::CreatedBuffer> {
+  const auto create = [](void*, const VkBufferCreateInfo&, vulkan::BufferUse,
+                         const char*) -> Result<vulkan::CreatedBuffer> {
     return Error{ErrorCode::ioError, "never called"};
   };
   const std::pair<const char*, Change> changes[] = {

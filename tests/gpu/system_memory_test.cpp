@@ -123,7 +123,7 @@ TEST_F(SystemMemoryTest, AnAllocatorThatGivesNothingIsToldAndGetsNothingBack) {
   static int destroyed;
   destroyed = 0;
   vulkan::SceneRecorderDescription own = description();
-  own.buffers.create = [](void*, const vulkan::BufferRequest&) {
+  own.buffers.create = [](void*, const VkBufferCreateInfo&, vulkan::BufferUse, const char*) {
     return Result(vulkan::CreatedBuffer{});
   };
   own.buffers.destroy = [](void*, const vulkan::CreatedBuffer&) { ++destroyed; };

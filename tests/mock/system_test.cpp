@@ -234,7 +234,8 @@ TEST_F(MockSystemTest, BuffersThatAreDestroyedDoNotCount) {
   static std::vector<std::byte> mapped(1 << 20);
   description.buffers = {
       nullptr,
-      [](void*, const vulkan::BufferRequest&) -> Result<vulkan::CreatedBuffer> {
+      [](void*, const VkBufferCreateInfo&, vulkan::BufferUse,
+         const char*) -> Result<vulkan::CreatedBuffer> {
         return vulkan::CreatedBuffer{bufferOf(BufferRole::meshes), mapped.data(), nullptr};
       },
       [](void*, const vulkan::CreatedBuffer&) {}};

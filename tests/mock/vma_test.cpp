@@ -56,7 +56,7 @@ namespace {
 struct VmaTest : public testing::Test {
   VmaTest() { calls = {}; }
   Result<CreatedBuffer> create(BufferUse use) const {
-    return callbacks.create(callbacks.user, {&info, use, "dermis output"});
+    return callbacks.create(callbacks.user, info, use, "dermis output");
   }
 
   const VmaAllocator allocator = handleOf<VmaAllocator>(48);

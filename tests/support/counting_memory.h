@@ -28,18 +28,18 @@ class CountingMemory {
   std::set<std::string> names;
 
  private:
-  static Result<vulkan::CreatedBuffer> create(void* user, const vulkan::BufferRequest& request) {
+  static Result<vulkan::CreatedBuffer> create(void* user, const VkBufferCreateInfo& info,
+                                              vulkan::BufferUse use, const char* name) {
     auto& self = *static_cast<CountingMemory*>(user);
     if (self.allocations == self.failsAt)
       return Error{ErrorCode::ioError, "the engine's allocator has had enough", 7};
-    const bool isMapped = request.use != vulkan::BufferUse::device;
-    auto* own = new samples::MappedBuffer(
-        must(samples::MappedBuffer::create(self.device_, request.info->size, request.info->usage,
-                                           request.use == vulkan::BufferUse::readBack)));
+    const bool isMapped = use != vulkan::BufferUse::device;
+    auto* own = new samples::MappedBuffer(must(samples::MappedBuffer::create(
+        self.device_, info.size, info.usage, use == vulkan::BufferUse::readBack)));
     ++self.allocations;
-    self.bytes += request.info->size;
-    self.uses.insert(request.use);
-    self.names.insert(request.name);
+    self.bytes += info.size;
+    self.uses.insert(use);
+    self.names.insert(name);
     return vulkan::CreatedBuffer{own->handle(), isMapped ? own->bytes().data() : nullptr, own};
   }
   static void destroy(void* user, const vulkan::CreatedBuffer& buffer) {

@@ -39,14 +39,13 @@ struct EngineBuffers {
                         const char* name, dermis_created_buffer* buffer, dermis_error* error);
   void (*destroy)(void* user, const dermis_created_buffer* buffer);
 
-  static Result<vulkan::CreatedBuffer> createBuffer(void* self,
-                                                    const vulkan::BufferRequest& request) {
+  static Result<vulkan::CreatedBuffer> createBuffer(void* self, const VkBufferCreateInfo& info,
+                                                    vulkan::BufferUse use, const char* name) {
     const EngineBuffers& buffers = *static_cast<const EngineBuffers*>(self);
     dermis_created_buffer made{};
     dermis_error error{};
-    const dermis_code code =
-        buffers.create(buffers.user, request.info, static_cast<dermis_memory_use>(request.use),
-                       request.name, &made, &error);
+    const dermis_code code = buffers.create(
+        buffers.user, &info, static_cast<dermis_memory_use>(use), name, &made, &error);
     if (code != DERMIS_OK) return callbackError(code, error, "create_buffer");
     return vulkan::CreatedBuffer{made.buffer, made.mapped, made.allocation};
   }

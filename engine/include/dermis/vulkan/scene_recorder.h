@@ -39,17 +39,6 @@ enum class BufferUse : std::uint8_t {
   readBack = 2,
 };
 
-/// What `BufferCallbacks::create` creates.
-struct BufferRequest {
-  /// Size and usage, with VK_SHARING_MODE_EXCLUSIVE and an empty pNext chain. The pointer is valid
-  /// during the call only. If the usage has VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, the memory
-  /// must be allocated with VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT.
-  const VkBufferCreateInfo* info = nullptr;
-  BufferUse use = BufferUse::device;
-  /// For debugging, for example "dermis output". A constant, the same for all buffers of a kind.
-  const char* name = "";
-};
-
 /// A buffer with its memory.
 struct CreatedBuffer {
   VkBuffer buffer{};
@@ -63,9 +52,14 @@ struct CreatedBuffer {
 /// has them for the Vulkan Memory Allocator.
 struct BufferCallbacks {
   void* user = nullptr;  ///< passed to both functions
-  /// Creates a buffer and binds memory to it. If it fails, the function that needs it fails
-  /// with the same error.
-  Result<CreatedBuffer> (*create)(void* user, const BufferRequest& request) = nullptr;
+  /// Creates a buffer and binds memory to it. If it fails, the function that needs it fails with
+  /// the same error. `info` has the size and the usage, VK_SHARING_MODE_EXCLUSIVE, and an empty
+  /// pNext chain; it is valid during the call only. If the usage has
+  /// VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, the memory must be allocated with
+  /// VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT. `name` is for debugging, for example "dermis output": a
+  /// constant, the same for all buffers of a kind.
+  Result<CreatedBuffer> (*create)(void* user, const VkBufferCreateInfo& info, BufferUse use,
+                                  const char* name) = nullptr;
   /// Destroys a buffer that the GPU no longer uses, and frees its memory.
   void (*destroy)(void* user, const CreatedBuffer& buffer) = nullptr;
 };

@@ -43,11 +43,8 @@ Result<OwnBuffer> OwnBuffer::create(BufferSource& source, const Description& des
   info.size = description.size;
   info.usage = description.usage;
   info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
-  BufferRequest request;
-  request.info = &info;
-  request.use = description.use;
-  request.name = description.name;
-  const Result<CreatedBuffer> created = source.callbacks.create(source.callbacks.user, request);
+  const Result<CreatedBuffer> created =
+      source.callbacks.create(source.callbacks.user, info, description.use, description.name);
   if (!created) return created.error();
   OwnBuffer buffer;
   buffer.source_ = &source;

@@ -54,8 +54,9 @@ std::uint64_t MemoryBlocks::bytes() const {
 BufferCallbacks MemoryBlocks::callbacks() {
   BufferCallbacks callbacks;
   callbacks.user = this;
-  callbacks.create = [](void* user, const BufferRequest& request) {
-    return static_cast<MemoryBlocks*>(user)->create(request);
+  callbacks.create = [](void* user, const VkBufferCreateInfo& info, BufferUse use,
+                        const char* name) {
+    return static_cast<MemoryBlocks*>(user)->create(info, use, name);
   };
   callbacks.destroy = [](void* user, const CreatedBuffer& buffer) {
     auto& self = *static_cast<MemoryBlocks*>(user);
@@ -66,17 +67,18 @@ BufferCallbacks MemoryBlocks::callbacks() {
   return callbacks;
 }
 
-Result<CreatedBuffer> MemoryBlocks::create(const BufferRequest& request) {
+Result<CreatedBuffer> MemoryBlocks::create(const VkBufferCreateInfo& info, BufferUse use,
+                                           const char* name) {
   CreatedBuffer buffer;
-  if (const VkResult result = functions_.createBuffer(context_.device, request.info,
-                                                      context_.allocator, &buffer.buffer);
+  if (const VkResult result =
+          functions_.createBuffer(context_.device, &info, context_.allocator, &buffer.buffer);
       result != VK_SUCCESS)
     return vulkanError("vkCreateBuffer", result);
   Need need;
   functions_.getBufferMemoryRequirements(context_.device, buffer.buffer, &need.requirements);
-  need.use = request.use;
-  need.hasAddress = (request.info->usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
-  const Result<Part> part = allocate(need, request.name);
+  need.use = use;
+  need.hasAddress = (info.usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+  const Result<Part> part = allocate(need, name);
   if (!part) {
     functions_.destroyBuffer(context_.device, buffer.buffer, context_.allocator);
     return part.error();

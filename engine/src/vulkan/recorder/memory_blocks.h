@@ -41,7 +41,7 @@ class MemoryBlocks {
     bool hasAddress = false;
   };
 
-  Result<CreatedBuffer> create(const BufferRequest& request);
+  Result<CreatedBuffer> create(const VkBufferCreateInfo& info, BufferUse use, const char* name);
   Result<Part> allocate(const Need& need, const char* name);
   void free(const Part& part);
   std::vector<std::uint32_t> typesFor(const Need& need) const;
