@@ -193,32 +193,22 @@ class [[nodiscard]] Result<void> {
 
 namespace dermis {
 
-/// A version number.
-struct Version {
-  std::uint32_t major = 0, minor = 0, patch = 0;
-
-  friend constexpr bool operator==(const Version&, const Version&) = default;
-};
-
-/// The version of the headers that the program was compiled with.
-inline constexpr Version headerVersion{DERMIS_VERSION_MAJOR, DERMIS_VERSION_MINOR,
-                                       DERMIS_VERSION_PATCH};
+/// The version of the headers that the program was compiled with: 10000 × major + 100 × minor +
+/// patch, as in C.
+inline constexpr std::uint32_t headerVersion =
+    DERMIS_VERSION_MAJOR * 10000 + DERMIS_VERSION_MINOR * 100 + DERMIS_VERSION_PATCH;
 
 /// The version of the library that the program was linked with or has loaded.
-DERMIS_CORE_API Version libraryVersion();
-
-/// Whether a library of version `library` has the interface that headers of version `headers`
-/// declare. The major versions must be equal. If they are 0, the minor versions must be equal, too;
-/// otherwise the minor version of the library must not be lower.
-constexpr bool isCompatible(const Version& headers, const Version& library) {
-  if (headers.major != library.major) return false;
-  return headers.major == 0 ? headers.minor == library.minor : headers.minor <= library.minor;
-}
+DERMIS_CORE_API std::uint32_t libraryVersion();
 
 /// Whether the library that is used at run time has the interface of the headers that the caller
-/// was compiled with. A program that loads Dermis as a shared library calls this first.
+/// was compiled with: the same major version, and a minor version that is not lower, or while the
+/// major version is 0, the same. A program that loads Dermis as a shared library calls this first.
 inline bool libraryFitsHeaders() {
-  return isCompatible(headerVersion, libraryVersion());
+  // Without the patches.
+  const std::uint32_t library = libraryVersion() / 100, headers = headerVersion / 100;
+  if (headers < 100) return library == headers;
+  return library / 100 == headers / 100 && library >= headers;
 }
 
 }  // namespace dermis

@@ -4,8 +4,7 @@
 extern "C" {
 
 uint32_t dermis_version(void) {
-  const dermis::Version version = dermis::libraryVersion();
-  return version.major * 10000 + version.minor * 100 + version.patch;
+  return dermis::libraryVersion();
 }
 
 void dermis_destroy(void* object) {

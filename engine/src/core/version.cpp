@@ -2,7 +2,7 @@
 
 namespace dermis {
 
-Version libraryVersion() {
+std::uint32_t libraryVersion() {
   return headerVersion;
 }
 
