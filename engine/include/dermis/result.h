@@ -3,9 +3,9 @@
 
 #include <cstdint>
 #include <cstdlib>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -98,37 +98,42 @@ struct Error {
 /// Either a value or an `Error`. Functions that return no value return `Result<void>`.
 template <typename T>
 class [[nodiscard]] Result {
+  static constexpr bool hasValue = !std::is_void_v<T>;
+  using Value = std::conditional_t<hasValue, T, std::monostate>;  // void cannot be a member
+
  public:
+  /// A success of a function that returns no value.
+  Result() requires(!hasValue) {}
   /// A success.
-  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+  Result(Value value) requires hasValue : state_(std::in_place_index<0>, std::move(value)) {}
   /// A failure.
   Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}
 
-  /// Whether there is a value.
+  /// Whether the function succeeded.
   bool ok() const { return state_.index() == 0; }
-  /// Whether there is a value.
+  /// Whether the function succeeded.
   explicit operator bool() const { return ok(); }
 
   /// The value. Calls std::abort if there is none.
-  T& value() & {
+  Value& value() & requires hasValue {
     require(ok());
     return *std::get_if<0>(&state_);
   }
   /// The value. Calls std::abort if there is none.
-  const T& value() const& {
+  const Value& value() const& requires hasValue {
     require(ok());
     return *std::get_if<0>(&state_);
   }
   /// The value, moved out. Calls std::abort if there is none.
-  T value() && {
+  Value value() && requires hasValue {
     require(ok());
     return std::move(*std::get_if<0>(&state_));
   }
-  T& operator*() & { return value(); }                   ///< `value`
-  const T& operator*() const& { return value(); }        ///< `value`
-  T operator*() && { return std::move(*this).value(); }  ///< `value`
-  T* operator->() { return &value(); }                   ///< the address of `value`
-  const T* operator->() const { return &value(); }       ///< the address of `value`
+  Value& operator*() & requires hasValue { return value(); }                   ///< `value`
+  const Value& operator*() const& requires hasValue { return value(); }        ///< `value`
+  Value operator*() && requires hasValue { return std::move(*this).value(); }  ///< `value`
+  Value* operator->() requires hasValue { return &value(); }                   ///< `&value()`
+  const Value* operator->() const requires hasValue { return &value(); }       ///< `&value()`
 
   /// The error. Calls std::abort if there is none.
   const Error& error() const& {
@@ -147,37 +152,12 @@ class [[nodiscard]] Result {
     if (!condition) std::abort();
   }
 
-  std::variant<T, Error> state_;
+  std::variant<Value, Error> state_;
 };
 
-/// Success, or an `Error`.
-template <>
-class [[nodiscard]] Result<void> {
- public:
-  /// A success.
-  Result() : error_(std::nullopt) {}
-  /// A failure.
-  Result(Error error) : error_(std::move(error)) {}
-
-  /// Whether the function succeeded.
-  bool ok() const { return !error_; }
-  /// Whether the function succeeded.
-  explicit operator bool() const { return ok(); }
-
-  /// The error. Calls std::abort if there is none.
-  const Error& error() const& {
-    if (ok()) std::abort();
-    return *error_;
-  }
-  /// The error, moved out. Calls std::abort if there is none.
-  Error error() && {
-    if (ok()) std::abort();
-    return *std::move(error_);
-  }
-
- private:
-  std::optional<Error> error_;
-};
+/// `Result(value)` is a success.
+template <typename T>
+Result(T value) -> Result<T>;
 
 }  // namespace dermis
 
