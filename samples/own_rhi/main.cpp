@@ -262,20 +262,17 @@ struct Executor {
   std::map<PipelineId, VkPipeline> pipelines;
   std::vector<Rhi::Buffer> staging;  ///< of the frame
 
-  SceneMemory memory() {
-    return {this,
-            [](void* user, const SceneBuffer& wanted) -> Result<void*> {
-              Executor& self = *static_cast<Executor*>(user);
-              const BufferRequirement& needed = wanted.requirement;
-              const Rhi::Buffer made = self.rhi.createBuffer(needed.size, needed.usage);
-              self.buffers[wanted.number] = made;
-              return static_cast<void*>(wanted.isMapped ? made.mapped : nullptr);
-            },
-            [](void* user, std::uint32_t number) {
-              Executor& self = *static_cast<Executor*>(user);
-              self.rhi.destroy(self.buffers.at(number));
-              self.buffers.erase(number);
-            }};
+  static Result<void*> createBuffer(void* user, const SceneBuffer& wanted) {
+    Executor& self = *static_cast<Executor*>(user);
+    const BufferRequirement& needed = wanted.requirement;
+    const Rhi::Buffer made = self.rhi.createBuffer(needed.size, needed.usage);
+    self.buffers[wanted.number] = made;
+    return static_cast<void*>(wanted.isMapped ? made.mapped : nullptr);
+  }
+  static void releaseBuffer(void* user, std::uint32_t number) {
+    Executor& self = *static_cast<Executor*>(user);
+    self.rhi.destroy(self.buffers.at(number));
+    self.buffers.erase(number);
   }
 
   void execute(std::span<const Command> commands);
@@ -369,7 +366,9 @@ int main() {
   SceneCommandsDescription description;
   description.scene.outputCapacity = {4096};  // grows
   description.limits = executor.rhi.limits();
-  description.memory = executor.memory();
+  description.user = &executor;
+  description.createBuffer = Executor::createBuffer;
+  description.releaseBuffer = Executor::releaseBuffer;
   SceneCommands commands = must(SceneCommands::create(description));
   Scene& scene = commands.scene();
 

@@ -559,13 +559,13 @@ TEST(CCommandsTest, AreThoseOfCpp) {
   description.scene.meshCapacity.initial = 1 << 20;
   description.scene.outputCapacity = {1 << 18, 1 << 20};
   description.scene.boundsCapacity.initial = 128;
-  description.memory = {&memory,
-                        [](void* user, const SceneBuffer& buffer) -> Result<void*> {
-                          auto& all = *static_cast<decltype(memory)*>(user);
-                          all[buffer.number].resize(buffer.requirement.size);
-                          return buffer.isMapped ? all[buffer.number].data() : nullptr;
-                        },
-                        [](void*, std::uint32_t) {}};
+  description.user = &memory;
+  description.createBuffer = [](void* user, const SceneBuffer& buffer) -> Result<void*> {
+    auto& all = *static_cast<decltype(memory)*>(user);
+    all[buffer.number].resize(buffer.requirement.size);
+    return buffer.isMapped ? all[buffer.number].data() : nullptr;
+  };
+  description.releaseBuffer = [](void*, std::uint32_t) {};
   SceneCommands same = must(SceneCommands::create(description));
   for (const auto& [number, bytes] : memory)
     EXPECT_EQ(buffers.buffers[number].size(), bytes.size()) << "buffer " << number;
@@ -675,14 +675,15 @@ TEST(CCommandsTest, RigsAreThoseOfCpp) {
   dermis_scene* const scene = dermis_commands_scene(commands);
   SceneCommandsDescription description;
   description.limits = smallLimitsOfCpp();
-  description.memory = {
-      &sameBuffers,
-      [](void* user, const SceneBuffer& buffer) -> Result<void*> {
-        auto& memory = static_cast<Buffers*>(user)->buffers[buffer.number];
-        memory.resize(buffer.requirement.size);
-        return buffer.isMapped ? memory.data() : nullptr;
-      },
-      [](void* user, std::uint32_t number) { static_cast<Buffers*>(user)->buffers.erase(number); }};
+  description.user = &sameBuffers;
+  description.createBuffer = [](void* user, const SceneBuffer& buffer) -> Result<void*> {
+    auto& memory = static_cast<Buffers*>(user)->buffers[buffer.number];
+    memory.resize(buffer.requirement.size);
+    return buffer.isMapped ? memory.data() : nullptr;
+  };
+  description.releaseBuffer = [](void* user, std::uint32_t number) {
+    static_cast<Buffers*>(user)->buffers.erase(number);
+  };
   SceneCommands same = must(SceneCommands::create(description));
 
   const PackedRig packedSame = riggedPose();

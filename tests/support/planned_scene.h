@@ -29,16 +29,16 @@ class PlannedScene {
   PlannedScene(const PlannedScene&) = delete;
   PlannedScene& operator=(const PlannedScene&) = delete;
 
-  /// The memory of the description is not used.
+  /// The functions of the description are not used.
   Result<void> tryToCreate(const SceneCommandsDescription& description) {
     SceneOwner owner;
-    owner.memory = {this,
-                    [](void* user, const SceneBuffer& wanted) {
-                      return static_cast<PlannedScene*>(user)->create(wanted);
-                    },
-                    [](void* user, std::uint32_t number) {
-                      EXPECT_EQ(static_cast<PlannedScene*>(user)->buffers.erase(number), 1u);
-                    }};
+    owner.user = this;
+    owner.createBuffer = [](void* user, const SceneBuffer& wanted) {
+      return static_cast<PlannedScene*>(user)->create(wanted);
+    };
+    owner.releaseBuffer = [](void* user, std::uint32_t number) {
+      EXPECT_EQ(static_cast<PlannedScene*>(user)->buffers.erase(number), 1u);
+    };
     Result<std::unique_ptr<Scene>> made = SceneAccess::create(
         {description.scene, description.limits, description.tuning, description.outputOffset},
         owner);

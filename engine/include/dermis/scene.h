@@ -492,7 +492,8 @@ class DERMIS_CORE_API Scene {
 // ---- A scene for an engine with its own RHI: the commands of each frame, and the buffers that
 // they use.
 //
-//     SceneCommands commands = *SceneCommands::create({.limits = limits, .memory = memory});
+//     SceneCommands commands = *SceneCommands::create(
+//         {.limits = limits, .user = &rhi, .createBuffer = create, .releaseBuffer = release});
 //     Scene& scene = commands.scene();
 //
 // and in each frame:
@@ -517,27 +518,25 @@ struct SceneBuffer {
   bool isMapped = false;
 };
 
-/// Creates and releases the buffers of a scene. Functions of the scene and of its owner call it. It
-/// must not throw, and must not call the scene.
-struct SceneMemory {
-  void* user = nullptr;  ///< passed to both functions
-  /// Creates a buffer, or reserves a part of one that the engine has. Returns the address of its
-  /// first byte if it is mapped, otherwise null. If poses are not mapped, the plan uploads them; if
-  /// a read-back buffer is not, the engine calls `SceneCommands::readBack`. If it fails, the scene
-  /// asks for a smaller buffer, or the function of the scene fails with the same error. Memory for
-  /// `readBack` is host-visible even so.
-  Result<void*> (*create)(void* user, const SceneBuffer& buffer) = nullptr;
-  /// Releases a buffer that no frame in flight uses. Buffers that remain when the owner is
-  /// destroyed are not released.
-  void (*release)(void* user, std::uint32_t number) = nullptr;
-};
-
 /// What `SceneCommands::create` needs to know.
 struct SceneCommandsDescription {
   SceneDescription scene;
   DeviceLimits limits;  ///< of the device
   Tuning tuning;
-  SceneMemory memory;  ///< required
+
+  // -- Required: two functions that create and release the buffers. Functions of the scene and of
+  // its owner call them. They must not throw, and must not call the scene.
+  void* user = nullptr;  ///< passed to both
+  /// Creates a buffer, or reserves a part of one that the engine has. Returns the address of its
+  /// first byte if it is mapped, otherwise null. If poses are not mapped, the plan uploads them; if
+  /// a read-back buffer is not, the engine calls `SceneCommands::readBack`. If it fails, the scene
+  /// asks for a smaller buffer, or the function of the scene fails with the same error. Memory for
+  /// `readBack` is host-visible even so.
+  Result<void*> (*createBuffer)(void* user, const SceneBuffer& buffer) = nullptr;
+  /// Releases a buffer that no frame in flight uses. Buffers that remain when the owner is
+  /// destroyed are not released.
+  void (*releaseBuffer)(void* user, std::uint32_t number) = nullptr;
+
   /// Byte offset of the output in its buffer, if that is part of a larger one. Offsets in
   /// `InstanceOutput` count from the beginning of that buffer, those in commands from here. Must be
   /// a multiple of the alignment of the output, which need not be a power of two.
@@ -549,7 +548,7 @@ class DERMIS_CORE_API SceneCommands {
  public:
   /// Creates the first buffers. Fails with `invalidArgument` if a member of the description is not
   /// valid, with `limitExceeded` if an initial capacity needs a buffer larger than a storage buffer
-  /// range, and with the error of `SceneMemory::create`.
+  /// range, and with the error of `createBuffer`.
   static Result<SceneCommands> create(const SceneCommandsDescription& description);
   ~SceneCommands();
   SceneCommands(SceneCommands&&) noexcept;
@@ -563,7 +562,7 @@ class DERMIS_CORE_API SceneCommands {
   /// be called any number of times between `beginFrame` and `commit`. The list is valid until the
   /// next call of a function of the scene or of this object. Fails with `invalidArgument` if
   /// `beginFrame` was not called, with `limitExceeded` if the tables are larger than a storage
-  /// buffer range, and with the error of `SceneMemory::create`.
+  /// buffer range, and with the error of `createBuffer`.
   Result<std::span<const Command>> plan();
   /// States that the commands of the last `plan` have been recorded, and will be executed in the
   /// order of frames. Without it, the next `plan` lists the same work again. Fails with

@@ -176,7 +176,9 @@ dermis_code dermis_commands_create(const dermis_commands_desc* callers, dermis_c
     description.scene = sceneOf(desc.scene);
     description.limits = limitsOf(desc.limits);
     description.tuning = tuningOf(desc.tuning);
-    description.memory = {&made->memory, EngineMemory::createBuffer, EngineMemory::releaseBuffer};
+    description.user = &made->memory;
+    description.createBuffer = EngineMemory::createBuffer;
+    description.releaseBuffer = EngineMemory::releaseBuffer;
     description.outputOffset = desc.output_offset;
     made->commands.emplace(must(SceneCommands::create(description)));
     made->scene.scene = &made->commands->scene();

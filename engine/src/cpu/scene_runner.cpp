@@ -141,12 +141,12 @@ Result<SceneRunner> SceneRunner::create(const SceneDescription& description,
   state.lent = output.first(output.size() / 4 * 4);
   SceneOwner owner;
   owner.user = &state;
-  owner.memory = {
-      &state,
-      [](void* user, const SceneBuffer& wanted) {
-        return static_cast<State*>(user)->createBuffer(wanted);
-      },
-      [](void* user, std::uint32_t number) { static_cast<State*>(user)->buffers.erase(number); }};
+  owner.createBuffer = [](void* user, const SceneBuffer& wanted) {
+    return static_cast<State*>(user)->createBuffer(wanted);
+  };
+  owner.releaseBuffer = [](void* user, std::uint32_t number) {
+    static_cast<State*>(user)->buffers.erase(number);
+  };
   owner.isCpu = true;
   owner.frameBegun = [](void* user, std::uint64_t) {
     State& begun = *static_cast<State*>(user);

@@ -35,10 +35,12 @@ struct SceneSetup {
   std::uint64_t outputOffset = 0;  ///< bytes before the output in its buffer
 };
 
-/// What a scene asks of its owner, besides buffers.
+/// What a scene asks of its owner.
 struct SceneOwner {
   void* user = nullptr;  ///< passed to all functions
-  SceneMemory memory;
+  // As in `SceneCommandsDescription`.
+  Result<void*> (*createBuffer)(void* user, const SceneBuffer& buffer) = nullptr;
+  void (*releaseBuffer)(void* user, std::uint32_t number) = nullptr;
   /// Whether frames are executed by the CPU: each is complete when the next begins, and there are
   /// neither culling nor poses of the GPU, nor methods for comparison.
   bool isCpu = false;

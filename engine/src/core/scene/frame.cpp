@@ -510,7 +510,7 @@ void SceneBooks::abandon() {
   for (GrowingBuffer* buffer : keptBuffers()) {
     if (!buffer->copied.exists()) continue;
     // It was to get the contents, and has been replaced in its turn.
-    if (buffer->before.exists()) owner_.memory.release(owner_.memory.user, buffer->before.number);
+    if (buffer->before.exists()) owner_.releaseBuffer(owner_.user, buffer->before.number);
     buffer->before = std::exchange(buffer->copied, SceneBufferMemory());
   }
   if (outputStore_.buffer.before.exists()) output_ = outputStore_.buffer.before.number;

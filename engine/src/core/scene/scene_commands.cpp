@@ -18,10 +18,12 @@ SceneCommands::SceneCommands(SceneCommands&&) noexcept = default;
 SceneCommands& SceneCommands::operator=(SceneCommands&&) noexcept = default;
 
 Result<SceneCommands> SceneCommands::create(const SceneCommandsDescription& description) {
-  if (description.memory.create == nullptr || description.memory.release == nullptr)
-    return invalid("SceneCommandsDescription::memory needs both of its functions");
+  if (description.createBuffer == nullptr || description.releaseBuffer == nullptr)
+    return invalid("SceneCommandsDescription::createBuffer and releaseBuffer are required");
   SceneOwner owner;
-  owner.memory = description.memory;
+  owner.user = description.user;
+  owner.createBuffer = description.createBuffer;
+  owner.releaseBuffer = description.releaseBuffer;
   Result<std::unique_ptr<Scene>> scene = SceneAccess::create(
       {description.scene, description.limits, description.tuning, description.outputOffset}, owner);
   if (!scene) return scene.error();

@@ -41,9 +41,9 @@ PlanSizes SceneBooks::sizes() const {
 }
 
 Result<SceneBufferMemory> SceneBooks::create(BufferRole role, const BufferRequirement& needed) {
-  const SceneMemory& memory = owner_.memory;
   const bool isMapped = role == BufferRole::poses || role == BufferRole::readBack;
-  const Result<void*> made = memory.create(memory.user, {nextBuffer_, role, needed, isMapped});
+  const Result<void*> made =
+      owner_.createBuffer(owner_.user, {nextBuffer_, role, needed, isMapped});
   if (!made) return made.error();
   return SceneBufferMemory{nextBuffer_++, needed.size,
                            isMapped ? static_cast<std::byte*>(*made) : nullptr};
@@ -85,7 +85,7 @@ Result<void> SceneBooks::addPoseBuffer(bool writtenByGpu, std::uint64_t joints) 
 /// The contents of the old buffer are copied by the next frame, unless it never got any.
 void SceneBooks::replace(GrowingBuffer& buffer, const SceneBufferMemory& larger) {
   if (buffer.before.exists()) {
-    owner_.memory.release(owner_.memory.user, buffer.now.number);
+    owner_.releaseBuffer(owner_.user, buffer.now.number);
   } else {
     buffer.before = buffer.now;
   }
@@ -119,7 +119,7 @@ void SceneBooks::freeRetired() {
     retired_.pop_front();
   }
   while (!retiredBuffers_.empty() && retiredBuffers_.front().frame <= completed_) {
-    owner_.memory.release(owner_.memory.user, retiredBuffers_.front().number);
+    owner_.releaseBuffer(owner_.user, retiredBuffers_.front().number);
     retiredBuffers_.pop_front();
   }
 }

@@ -114,12 +114,12 @@ Result<SceneRecorder> SceneRecorder::create(const Context& lent,
   }
   SceneOwner owner;
   owner.user = &state;
-  owner.memory = {
-      &state,
-      [](void* user, const SceneBuffer& wanted) {
-        return static_cast<State*>(user)->createBuffer(wanted);
-      },
-      [](void* user, std::uint32_t number) { static_cast<State*>(user)->releaseBuffer(number); }};
+  owner.createBuffer = [](void* user, const SceneBuffer& wanted) {
+    return static_cast<State*>(user)->createBuffer(wanted);
+  };
+  owner.releaseBuffer = [](void* user, std::uint32_t number) {
+    static_cast<State*>(user)->releaseBuffer(number);
+  };
   owner.frameBegun = [](void* user, std::uint64_t completedFrame) {
     static_cast<State*>(user)->frameBegun(completedFrame);
   };
