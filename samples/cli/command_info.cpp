@@ -73,7 +73,7 @@ Json describePart(const Scene& scene, const ScenePart& part, bool isFirst) {
   json["packedBytes"] = part.mesh ? part.mesh->packed().bytes().size() : 0;
   json["problems"] = Json::array();
   static const MeshReport none;
-  for (const MeshFinding& finding : (part.mesh ? part.mesh->report() : none).findings) {
+  for (const MeshReport::Finding& finding : (part.mesh ? part.mesh->report() : none).findings) {
     json["problems"].push_back({{"kind", meshProblemName(finding.problem)},
                                 {"vertices", finding.count},
                                 {"firstVertex", finding.firstVertex},

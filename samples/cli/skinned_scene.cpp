@@ -47,7 +47,7 @@ std::string nameOf(const std::filesystem::path& path) {
 }
 
 void addFindings(Scene& scene, const MeshReport& report) {
-  for (const MeshFinding& finding : report.findings) {
+  for (const MeshReport::Finding& finding : report.findings) {
     std::string text = finding.message;
     if (finding.count > 1) text += fmt::format(" (and {} more such vertices)", finding.count - 1);
     if (refusedByPack(finding.problem)) {

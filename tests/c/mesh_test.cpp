@@ -119,7 +119,7 @@ TEST(CMeshTest, FindingsAndRepair) {
               "a mesh of C", DERMIS_INVALID_MESH);
   ASSERT_EQ(messages.size(), expected.findings.size());
   for (std::size_t i = 0; i < messages.size(); ++i) {
-    const MeshFinding& finding = expected.findings[i];
+    const MeshReport::Finding& finding = expected.findings[i];
     std::string message = finding.message;
     message.replace(message.find("random"), 6, "a mesh of C");
     EXPECT_EQ(messages[i], message + std::to_string(static_cast<int>(finding.problem)) +

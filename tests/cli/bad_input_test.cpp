@@ -204,7 +204,7 @@ void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::s
     return;
   }
   ASSERT_TRUE(repaired.ok()) << repaired.error().message;
-  const MeshFinding* changed = repaired->report().find(broken.problem);
+  const MeshReport::Finding* changed = repaired->report().find(broken.problem);
   ASSERT_NE(changed, nullptr);
   EXPECT_EQ(changed->message, sentence) << "it says what it changed";
   EXPECT_TRUE(validate(repaired->view(), LineMesh::jointCount).packable());
@@ -286,7 +286,7 @@ TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndR
     broken.breakIt(mesh);
     const MeshReport report = validate(mesh.view, LineMesh::jointCount);
     ASSERT_EQ(report.findings.size(), 1u) << meshProblemName(broken.problem);
-    const MeshFinding& finding = report.findings[0];
+    const MeshReport::Finding& finding = report.findings[0];
     SCOPED_TRACE(finding.message);
     EXPECT_EQ(finding.problem, broken.problem);
     EXPECT_EQ(finding.count, broken.count);

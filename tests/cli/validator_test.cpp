@@ -134,7 +134,7 @@ Opinion opinionOf(Load load) {
   opinion.list = scene->notes;
   for (const cli::ScenePart& part : scene->parts) {
     if (part.mesh == nullptr) continue;
-    for (const MeshFinding& finding : part.mesh->report().findings)
+    for (const MeshReport::Finding& finding : part.mesh->report().findings)
       opinion.list.push_back(finding.message);
   }
   return opinion;

@@ -97,7 +97,8 @@ Result<PackedMesh> packMesh(std::string_view name, std::span<const Vertex> verti
   // For example, an influence names a joint that does not exist: `repair` drops it.
   Result<RepairedMesh> repaired = repair(mesh, jointCount);
   if (!repaired) return repaired.error();
-  for (const MeshFinding& finding : repaired->report().findings) logWarning(finding.message);
+  for (const MeshReport::Finding& finding : repaired->report().findings)
+    logWarning(finding.message);
   return pack(repaired->view(), jointCount);
 }
 // [/own-arrays]

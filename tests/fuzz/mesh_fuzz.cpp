@@ -205,7 +205,7 @@ class MeshMaker {
 
 void checkReport(const MeshReport& report) {
   std::optional<MeshProblem> last;
-  for (const MeshFinding& finding : report.findings) {
+  for (const MeshReport::Finding& finding : report.findings) {
     require(!last || finding.problem > *last);
     require(finding.count > 0);
     require(finding.message.starts_with("mesh 'fuzz'"));

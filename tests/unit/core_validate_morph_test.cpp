@@ -48,7 +48,7 @@ struct ValidateMorphs : public ::testing::Test {
   std::string onlyFinding(MeshProblem problem, std::uint64_t count, std::uint32_t firstVertex) {
     const MeshReport found = report();
     EXPECT_EQ(found.findings.size(), 1u);
-    const MeshFinding* finding = found.find(problem);
+    const MeshReport::Finding* finding = found.find(problem);
     EXPECT_NE(finding, nullptr);
     if (finding == nullptr) return "";
     EXPECT_EQ(finding->count, count) << finding->message;

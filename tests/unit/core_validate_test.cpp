@@ -45,10 +45,10 @@ struct ValidateTest : public ::testing::Test {
   std::string onlyFinding(MeshProblem problem, std::uint64_t count, std::uint32_t firstVertex) {
     const MeshReport report = validate(view, jointCount);
     EXPECT_EQ(report.findings.size(), 1u);
-    for (const MeshFinding& finding : report.findings) {
+    for (const MeshReport::Finding& finding : report.findings) {
       EXPECT_EQ(finding.problem, problem) << finding.message;
     }
-    const MeshFinding* finding = report.find(problem);
+    const MeshReport::Finding* finding = report.find(problem);
     EXPECT_NE(finding, nullptr);
     if (finding == nullptr) return "";
     EXPECT_EQ(finding->count, count);
@@ -374,7 +374,7 @@ TEST_F(ValidateTest, HalvesMayBeInfiniteOrNoNumber) {
       const MeshReport report = validate(view, jointCount);
       // The fourth is read of tangents only.
       EXPECT_EQ(report.findings.size(), component == 3 ? 1u : 3u);
-      for (const MeshFinding& finding : report.findings) EXPECT_EQ(finding.firstVertex, 6u);
+      for (const MeshReport::Finding& finding : report.findings) EXPECT_EQ(finding.firstVertex, 6u);
       EXPECT_NE(report.find(MeshProblem::nonFiniteTangent), nullptr);
       EXPECT_EQ(report.find(MeshProblem::nonFinitePosition) != nullptr, component != 3);
       EXPECT_EQ(report.find(MeshProblem::nonFiniteNormal) != nullptr, component != 3);

@@ -267,27 +267,26 @@ enum class MeshProblem : std::uint8_t {
   tangentSign = 21,    ///< the handedness of a tangent is neither 1 nor -1
 };
 
-/// One kind of problem in one mesh.
-struct MeshFinding {
-  MeshProblem problem = MeshProblem::emptyMesh;
-  std::uint64_t count = 0;  ///< number of vertices, morph displacements or views that have it
-  /// The first such vertex. 0 if the problem is one of a view or of the whole mesh.
-  std::uint32_t firstVertex = 0;
-  /// A sentence about the first place, for example "mesh 'Fox', vertex 17: joint 31 is outside the
-  /// pose of 24 joints".
-  std::string message;
-};
-
 /// All problems of one mesh.
 struct MeshReport {
-  std::vector<MeshFinding> findings;  ///< at most one for each kind, in the order of `MeshProblem`
+  /// One kind of problem in one mesh.
+  struct Finding {
+    MeshProblem problem = MeshProblem::emptyMesh;
+    std::uint64_t count = 0;  ///< number of vertices, morph displacements or views that have it
+    /// The first such vertex. 0 if the problem is one of a view or of the whole mesh.
+    std::uint32_t firstVertex = 0;
+    /// A sentence about the first place, for example "mesh 'Fox', vertex 17: joint 31 is outside
+    /// the pose of 24 joints".
+    std::string message;
+  };
+  std::vector<Finding> findings;  ///< at most one for each kind, in the order of `MeshProblem`
 
   /// Whether `pack` accepts the mesh.
   DERMIS_CORE_API bool packable() const;
   /// Whether all views are valid, so that `repair` can fix the mesh.
   DERMIS_CORE_API bool repairable() const;
   /// The finding of this kind; null if there is none.
-  DERMIS_CORE_API const MeshFinding* find(MeshProblem problem) const;
+  DERMIS_CORE_API const Finding* find(MeshProblem problem) const;
   /// Fails with `invalidMesh`, as `pack` does, unless the mesh is `packable`. The message is that
   /// of the first finding that is `refusedByPack`. It mentions `repair` if the mesh is
   /// `repairable`.

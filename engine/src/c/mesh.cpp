@@ -16,7 +16,7 @@ dermis_code dermis_validate(const dermis_mesh_view* mesh, uint32_t joint_count,
   return guarded(error, [&] {
     const View view(mesh);
     const MeshReport report = validate(view.mesh, joint_count);
-    for (const MeshFinding& finding : report.findings) {
+    for (const MeshReport::Finding& finding : report.findings) {
       if (found == nullptr) break;
       const dermis_finding converted{sizeof(dermis_finding),
                                      static_cast<dermis_problem>(finding.problem),

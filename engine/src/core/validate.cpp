@@ -21,13 +21,13 @@ class Findings {
   explicit Findings(std::string_view meshName) : prefix_("mesh " + inQuotes(meshName)) {}
 
   void addView(MeshProblem problem, const std::string& text) {
-    MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
+    MeshReport::Finding& finding = findings_[static_cast<std::size_t>(problem)];
     if (finding.count++ == 0) finding.message = prefix_ + ": " + text;
   }
 
   template <typename MakeText>
   void addVertex(MeshProblem problem, std::uint32_t vertex, MakeText&& makeText) {
-    const MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
+    const MeshReport::Finding& finding = findings_[static_cast<std::size_t>(problem)];
     // Several influences of one vertex may have the same problem: it counts once.
     if (finding.count != 0 && lastVertex_[static_cast<std::size_t>(problem)] == vertex) return;
     lastVertex_[static_cast<std::size_t>(problem)] = vertex;
@@ -36,7 +36,7 @@ class Findings {
 
   template <typename MakeText>
   void addEach(MeshProblem problem, std::uint32_t vertex, MakeText&& makeText) {
-    MeshFinding& finding = findings_[static_cast<std::size_t>(problem)];
+    MeshReport::Finding& finding = findings_[static_cast<std::size_t>(problem)];
     if (finding.count++ == 0) {
       finding.firstVertex = vertex;
       finding.message = prefix_ + ", vertex " + std::to_string(vertex) + ": " + makeText();
@@ -55,7 +55,7 @@ class Findings {
 
  private:
   std::string prefix_;
-  std::array<MeshFinding, problemCount> findings_{};
+  std::array<MeshReport::Finding, problemCount> findings_{};
   std::array<std::uint32_t, problemCount> lastVertex_{};
 };
 
@@ -446,25 +446,25 @@ const char* meshProblemName(MeshProblem problem) {
 
 bool MeshReport::packable() const {
   return std::none_of(findings.begin(), findings.end(),
-                      [](const MeshFinding& finding) { return refusedByPack(finding.problem); });
+                      [](const Finding& finding) { return refusedByPack(finding.problem); });
 }
 
 Result<void> MeshReport::accepted() const {
   const auto refused = std::ranges::find_if(
-      findings, [](const MeshFinding& finding) { return refusedByPack(finding.problem); });
+      findings, [](const Finding& finding) { return refusedByPack(finding.problem); });
   if (refused == findings.end()) return {};
   return Error{ErrorCode::invalidMesh,
                refused->message + (repairable() ? "; repair() can fix it" : "")};
 }
 
 bool MeshReport::repairable() const {
-  return std::none_of(findings.begin(), findings.end(), [](const MeshFinding& finding) {
+  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
     return finding.problem <= MeshProblem::morphVertices;
   });
 }
 
-const MeshFinding* MeshReport::find(MeshProblem problem) const {
-  for (const MeshFinding& finding : findings) {
+const MeshReport::Finding* MeshReport::find(MeshProblem problem) const {
+  for (const Finding& finding : findings) {
     if (finding.problem == problem) return &finding;
   }
   return nullptr;

@@ -296,7 +296,7 @@ Result<void> run() {
   printGlm();
   Model model;
   const MeshView mesh = model.view();
-  for (const MeshFinding& finding : validate(mesh, jointCount).findings)
+  for (const MeshReport::Finding& finding : validate(mesh, jointCount).findings)
     std::printf("%s: %llu\n", meshProblemName(finding.problem),
                 static_cast<unsigned long long>(finding.count));
 
