@@ -449,7 +449,7 @@ class Report {
 
   /// Call it after each record.
   void add(std::span<const Figure> figures, const Cost& cost) {
-    const FrameStatistics& work = cost.scene.lastFrame;
+    const SceneStatistics::Frame& work = cost.scene.lastFrame;
     std::uint32_t present = 0, inView = 0;
     for (const Figure& figure : figures) {
       if (figure.isThere()) ++present;
@@ -468,7 +468,7 @@ class Report {
 
   /// Call it for each frame that the GPU has completed.
   void complete(const Cost& cost) {
-    const CullingStatistics& completed = cost.scene.lastCompletedFrame;
+    const SceneStatistics::Culling& completed = cost.scene.lastCompletedFrame;
     if (completed.frame <= std::exchange(completedFrame_, completed.frame)) return;
     skinned_ += completed.skinnedInstances;
     gpuSeconds_ += cost.skinSeconds.value_or(0);
@@ -482,7 +482,7 @@ class Report {
     Json verticesPerSecond;
     if (gpuSeconds_ > 0 && !options_->culledOnGpu)
       verticesPerSecond = static_cast<double>(vertices_) / gpuSeconds_;
-    const auto store = [](const StoreStatistics& bytes) -> Json {
+    const auto store = [](const SceneStatistics::Store& bytes) -> Json {
       return {
           {"capacity", bytes.capacity}, {"used", bytes.used}, {"largestFree", bytes.largestFree}};
     };
@@ -536,8 +536,8 @@ class Report {
 
  private:
   void addRow(std::uint32_t present, const Cost& cost) {
-    const FrameStatistics& work = cost.scene.lastFrame;
-    const CullingStatistics& completed = cost.scene.lastCompletedFrame;
+    const SceneStatistics::Frame& work = cost.scene.lastFrame;
+    const SceneStatistics::Culling& completed = cost.scene.lastCompletedFrame;
     // If the GPU culls, the CPU learns what it skinned when the frame is complete.
     const bool culledOnGpu = options_->culledOnGpu;
     const auto skinned = culledOnGpu ? completed.skinnedInstances : work.skinnedInstances;

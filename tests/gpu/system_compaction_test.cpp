@@ -77,7 +77,7 @@ TEST_F(SystemCompactionTest, BytesComeAlong) {
   // They settled in the same frame: nobody moved in it.
   for (const std::uint32_t number : {1u, 3u, 4u, 5u}) expectPose(number, 10, 10);
   engine_->runFrame();
-  const StoreStatistics outputs = scene().statistics().outputs;
+  const SceneStatistics::Store outputs = scene().statistics().outputs;
   EXPECT_EQ(outputs.largestFree, outputs.capacity - outputs.used) << "one stretch";
 }
 
@@ -168,7 +168,7 @@ TEST_F(SystemCompactionTest, WhatGoesBeforeItMovesIsNoTrouble) {
   for (const std::uint32_t number : {2u, 3u}) expectPose(number, 0, 0);
   EXPECT_TRUE(engine_->read(instances_[4]) == alone(coarse, systemPose(4), instance_));
   for (int i = 0; i < 4; ++i) engine_->runFrame();
-  const StoreStatistics outputs = scene().statistics().outputs;
+  const SceneStatistics::Store outputs = scene().statistics().outputs;
   EXPECT_EQ(outputs.used, 2 * must(scene().output(instances_[2])).places.size +
                               must(scene().output(instances_[4])).places.size)
       << "no place is lost";

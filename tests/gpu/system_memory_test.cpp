@@ -226,7 +226,8 @@ TEST_F(SystemMemoryTest, BuffersTakenAndGivenBackForeverNeedNoMoreMemory) {
   EXPECT_EQ(statistics.meshes.used, 0u);
   EXPECT_EQ(statistics.palettes.used, 0u);
   EXPECT_EQ(statistics.outputs.used, 0u);
-  for (const StoreStatistics& store : {statistics.meshes, statistics.palettes, statistics.outputs})
+  for (const SceneStatistics::Store& store :
+       {statistics.meshes, statistics.palettes, statistics.outputs})
     EXPECT_EQ(store.largestFree, store.capacity);
 }
 
@@ -237,7 +238,7 @@ TEST_F(SystemMemoryTest, StatisticsAddUp) {
   EXPECT_EQ(statistics.outputs.used, 100u * 36);
   EXPECT_GE(statistics.outputs.capacity, 4u << 20);
   EXPECT_GE(statistics.meshes.capacity, 4u << 20);
-  for (const StoreStatistics& store :
+  for (const SceneStatistics::Store& store :
        {statistics.meshes, statistics.palettes, statistics.outputs}) {
     EXPECT_GT(store.used, 0u);
     EXPECT_LE(store.used + store.largestFree, store.capacity);

@@ -165,7 +165,7 @@ TEST_F(SystemResultsTest, NothingIsReadBackOfAFrameThatIsNotComplete) {
   engine_->submitNow([](VkCommandBuffer) {});
   engine_->begin(1);
   ASSERT_EQ(engine_->completedFrame(), 1u);
-  const CullingStatistics gpu = (*engine_)->statistics().lastCompletedFrame;
+  const SceneStatistics::Culling gpu = (*engine_)->statistics().lastCompletedFrame;
   EXPECT_EQ(gpu.frame, 1u);
   EXPECT_EQ(gpu.visibleInstances, instanceCount);
   for (std::uint32_t i = 0; i < instanceCount; ++i)

@@ -64,10 +64,10 @@ class SystemVisibilityTest : public SystemTest {
     submit();
   }
   /// What the GPU did in the frame that was submitted last.
-  CullingStatistics completed() {
+  SceneStatistics::Culling completed() {
     const std::uint64_t number = engine_->frame();
     engine_->begin();
-    const CullingStatistics statistics = (*engine_)->statistics().lastCompletedFrame;
+    const SceneStatistics::Culling statistics = (*engine_)->statistics().lastCompletedFrame;
     EXPECT_EQ(statistics.frame, number);
     return statistics;
   }

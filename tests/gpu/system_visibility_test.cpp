@@ -61,7 +61,7 @@ TEST_F(SystemVisibilityTest, TheEngineMayCullOnTheGpu) {
   EXPECT_EQ(engine_->lastFrame().skinnedInstances, 0u) << "the CPU does not know";
   std::vector<std::byte> bytes = engine_->readOutput();
   for (std::uint32_t i = 0; i < instanceCount; ++i) expectMotion(bytes, i, 0, 0);
-  CullingStatistics gpu = completed();
+  SceneStatistics::Culling gpu = completed();
   EXPECT_EQ(gpu.visibleInstances, instanceCount);
   EXPECT_EQ(gpu.skinnedInstances, instanceCount);
   EXPECT_GT(gpu.workgroups, 0u);
@@ -123,7 +123,7 @@ TEST_F(SystemVisibilityTest, WhatRestsInViewOfTheGpuSettlesAndIsNotSkinnedAgain)
   moveAllInFrame(100);
   engine_->begin();
   submit();
-  CullingStatistics gpu = completed();
+  SceneStatistics::Culling gpu = completed();
   EXPECT_EQ(gpu.skinnedInstances, 0u);
   EXPECT_EQ(gpu.settledInstances, instanceCount);
   std::vector<std::byte> bytes = engine_->readOutput();
@@ -150,7 +150,7 @@ TEST_F(SystemVisibilityTest, WhatTheGpuShowsAgainSettlesOnlyIfItHasTo) {
   show(0, 20);
   engine_->begin();
   submit();  // the first twenty settle, the others are out of view
-  CullingStatistics gpu = completed();
+  SceneStatistics::Culling gpu = completed();
   EXPECT_EQ(gpu.settledInstances, 20u);
   submit();
   show(0, 0);
@@ -203,7 +203,7 @@ TEST_F(SystemVisibilityTest, UpdateIntervalsHoldForWhatTheGpuSees) {
       }
       ASSERT_TRUE(positions == positionsIn(i + shown[i])) << i << ", frame " << frame;
     }
-    const CullingStatistics gpu = completed();
+    const SceneStatistics::Culling gpu = completed();
     EXPECT_EQ(gpu.skinnedInstances, skinned);
     EXPECT_LT(skinned, visible / 2) << "they take turns";
   }

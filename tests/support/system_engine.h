@@ -24,7 +24,7 @@
 namespace dermis::test {
 
 /// What a frame did, and what it took to record it.
-struct LastFrame : FrameStatistics, vulkan::RecorderStatistics {};
+struct LastFrame : SceneStatistics::Frame, vulkan::RecorderStatistics {};
 
 class SystemEngine {
  public:

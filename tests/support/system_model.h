@@ -111,7 +111,7 @@ class SystemModel {
     std::erase_if(locked_,
                   [&](const Place& place) { return place.frame <= engine_.completedFrame(); });
     checkWritten();
-    const CullingStatistics gpu = engine_->statistics().lastCompletedFrame;
+    const SceneStatistics::Culling gpu = engine_->statistics().lastCompletedFrame;
     const auto counted = gpuCounts_.find(gpu.frame);
     if (counted == gpuCounts_.end()) return;
     EXPECT_EQ(gpu.visibleInstances, counted->second.visible) << "frame " << gpu.frame;
@@ -315,7 +315,7 @@ class SystemModel {
     return isSkinned;
   }
   void checkStatistics(const Lists& lists) const {
-    const FrameStatistics frame = engine_->statistics().lastFrame;
+    const SceneStatistics::Frame frame = engine_->statistics().lastFrame;
     EXPECT_EQ(frame.frame, engine_.frame());
     EXPECT_EQ(frame.instances, instances.size());
     EXPECT_EQ(frame.skinnedInstances, lists.skinned.size());

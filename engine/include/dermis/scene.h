@@ -232,47 +232,48 @@ struct IndexedDraw {
   std::uint32_t firstInstance = 0;  ///< position in the list
 };
 
-/// Bytes of one buffer of a scene.
-struct StoreStatistics {
-  std::uint64_t capacity = 0;
-  std::uint64_t used = 0;         ///< including what frames in flight may still read
-  std::uint64_t largestFree = 0;  ///< size of the largest free range
-};
-
-/// What the last frame that was executed does; zeros after `abandonFrame`. Skinned and settled
-/// instances, vertices and bytes written do not include instances culled on the GPU.
-struct FrameStatistics {
-  std::uint64_t frame = 0;
-  std::uint32_t instances = 0;  ///< in the scene
-  std::uint32_t skinnedInstances = 0;
-  std::uint32_t settledInstances = 0;  ///< instances of which only previous positions are written
-  /// Figures whose poses were sampled from clips. Those that only instances culled on the GPU need
-  /// are counted in every frame in which they may be.
-  std::uint32_t sampledFigures = 0;
-  /// A pose counts once for each palette that methods need of it. Poses of figures count, too.
-  std::uint32_t convertedPoses = 0;
-  std::uint32_t culledCandidates = 0;  ///< instances that the visibility kernel looks at
-  std::uint64_t skinnedVertices = 0;
-  std::uint64_t writtenBytes = 0;  ///< of skinned vertices
-  std::uint64_t movedBytes = 0;    ///< by `compact`
-  std::uint64_t poseBytes = 0;  ///< joint matrices that the CPU wrote and the palette kernel reads
-};
-
-/// What the visibility kernel counted in a complete frame. The counts are 0 if no instance was
-/// culled on the GPU.
-struct CullingStatistics {
-  std::uint64_t frame = 0;
-  std::uint32_t visibleInstances = 0;
-  std::uint32_t skinnedInstances = 0;
-  std::uint32_t settledInstances = 0;
-  std::uint32_t workgroups = 0;  ///< of the indirect dispatches
-};
-
 /// What `Scene::statistics` returns.
 struct SceneStatistics {
-  FrameStatistics lastFrame;                  ///< the last that was executed
-  CullingStatistics lastCompletedFrame;       ///< the last that was read back
-  StoreStatistics meshes, palettes, outputs;  ///< memory now
+  /// Bytes of one buffer of a scene.
+  struct Store {
+    std::uint64_t capacity = 0;
+    std::uint64_t used = 0;         ///< including what frames in flight may still read
+    std::uint64_t largestFree = 0;  ///< size of the largest free range
+  };
+
+  /// What the last frame that was executed does; zeros after `abandonFrame`. Skinned and settled
+  /// instances, vertices and bytes written do not include instances culled on the GPU.
+  struct Frame {
+    std::uint64_t frame = 0;
+    std::uint32_t instances = 0;  ///< in the scene
+    std::uint32_t skinnedInstances = 0;
+    std::uint32_t settledInstances = 0;  ///< instances of which only previous positions are written
+    /// Figures whose poses were sampled from clips. Those that only instances culled on the GPU
+    /// need are counted in every frame in which they may be.
+    std::uint32_t sampledFigures = 0;
+    /// A pose counts once for each palette that methods need of it. Poses of figures count, too.
+    std::uint32_t convertedPoses = 0;
+    std::uint32_t culledCandidates = 0;  ///< instances that the visibility kernel looks at
+    std::uint64_t skinnedVertices = 0;
+    std::uint64_t writtenBytes = 0;  ///< of skinned vertices
+    std::uint64_t movedBytes = 0;    ///< by `compact`
+    /// Joint matrices that the CPU wrote and the palette kernel reads.
+    std::uint64_t poseBytes = 0;
+  };
+
+  /// What the visibility kernel counted in a complete frame. The counts are 0 if no instance was
+  /// culled on the GPU.
+  struct Culling {
+    std::uint64_t frame = 0;
+    std::uint32_t visibleInstances = 0;
+    std::uint32_t skinnedInstances = 0;
+    std::uint32_t settledInstances = 0;
+    std::uint32_t workgroups = 0;  ///< of the indirect dispatches
+  };
+
+  Frame lastFrame;                  ///< the last that was executed
+  Culling lastCompletedFrame;       ///< the last that was read back
+  Store meshes, palettes, outputs;  ///< memory now
 };
 
 struct SceneBooks;

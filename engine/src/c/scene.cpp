@@ -39,7 +39,7 @@ InstanceChange changeOf(const dermis_change& change) {
   return result;
 }
 
-dermis_store storeOf(const StoreStatistics& store) {
+dermis_store storeOf(const SceneStatistics::Store& store) {
   return {store.capacity, store.used, store.largestFree};
 }
 
@@ -236,8 +236,8 @@ dermis_code dermis_scene_contents(dermis_scene* scene, dermis_scene_info* info,
     convertList(source.skinnedInstances(), scene->skinned);
     convertList(source.settledInstances(), scene->settled);
     const SceneStatistics statistics = source.statistics();
-    const FrameStatistics& frame = statistics.lastFrame;
-    const CullingStatistics& culling = statistics.lastCompletedFrame;
+    const SceneStatistics::Frame& frame = statistics.lastFrame;
+    const SceneStatistics::Culling& culling = statistics.lastCompletedFrame;
     dermis_scene_info result{};
     result.instances = frame.instances;
     result.frame = source.frame();

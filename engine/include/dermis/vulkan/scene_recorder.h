@@ -101,7 +101,7 @@ struct RecorderStatistics {
   std::uint32_t dispatches = 0;     ///< direct and indirect
   std::uint64_t workgroups = 0;     ///< of direct dispatches
   std::uint32_t copies = 0;         ///< copy commands: tables, meshes, moved outputs, results
-  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and `FrameStatistics::poseBytes`
+  std::uint64_t uploadedBytes = 0;  ///< tables, meshes and `SceneStatistics::Frame::poseBytes`
   double planSeconds = 0;           ///< CPU time to plan the frame and write its tables
   double recordSeconds = 0;         ///< CPU time to record the commands
 

@@ -529,7 +529,7 @@ struct SceneBooks {
   std::vector<UploadCommand> uploads_;
   PlanBuffers buffers_;  ///< that it names
   std::vector<InstanceHandle> skinned_, settled_;
-  FrameStatistics planned_, committed_;
+  SceneStatistics::Frame planned_, committed_;
 
   /// The results that a frame reads back.
   struct ReadBack {
@@ -547,7 +547,7 @@ struct SceneBooks {
   }
   ReadBack& nextReadBack() { return readBackOf(record_ + 1); }
   std::vector<ReadBack> readBacks_;  ///< of the frames in flight
-  CullingStatistics culling_;
+  SceneStatistics::Culling culling_;
   std::vector<InstanceResult> latestResults_;  ///< by number, as they were last read back …
   std::vector<InstanceResult> earlierResults_;  ///< … of previous positions, if it interpolates …
   std::vector<std::uint64_t> resultFrames_;     ///< … in these frames

@@ -236,9 +236,9 @@ Result<void> Scene::markAllWritten() {
 SceneStatistics Scene::statistics() const {
   const SceneBooks& books = *books_;
   const auto of = [](const Store& store) {
-    return StoreStatistics{store.ranges.capacity() * store.unitBytes,
-                           store.ranges.used() * store.unitBytes,
-                           store.ranges.largestFree() * store.unitBytes};
+    return SceneStatistics::Store{store.ranges.capacity() * store.unitBytes,
+                                  store.ranges.used() * store.unitBytes,
+                                  store.ranges.largestFree() * store.unitBytes};
   };
   return {books.committed_, books.culling_, of(books.meshStore_), of(books.unitStore_),
           of(books.outputStore_)};
