@@ -274,14 +274,14 @@ Json describeMaterial(const gltf::Material& material) {
                                   {"roughnessFactor", shortest(clamped(material.roughness))}};
   json["emissiveFactor"] = factors(material.emissive);
   switch (material.alphaMode) {
-    case gltf::AlphaMode::opaque:
+    case gltf::Material::AlphaMode::opaque:
       json["alphaMode"] = "OPAQUE";
       break;
-    case gltf::AlphaMode::mask:
+    case gltf::Material::AlphaMode::mask:
       json["alphaMode"] = "MASK";
       json["alphaCutoff"] = shortest(std::max(material.alphaCutoff, 0.0f));
       break;
-    case gltf::AlphaMode::blend:
+    case gltf::Material::AlphaMode::blend:
       json["alphaMode"] = "BLEND";
       break;
   }

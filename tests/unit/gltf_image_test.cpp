@@ -46,11 +46,11 @@ TEST(GltfImageTest, ComeFromDataUris) {
       loadedWithImages(textured({{"uri", "data:image/png;base64,YWJj"}, {"name", "skin"}}));
   EXPECT_EQ(imageText(model), "abc");
   EXPECT_EQ(model.images[0].name, "image 0 'skin'");
-  const gltf::TextureUse& use = model.materials.at(0).baseColorTexture;
+  const gltf::Material::Texture& use = model.materials.at(0).baseColorTexture;
   EXPECT_EQ(use.image, 0u);
   EXPECT_EQ(use.texcoord, 0u);
-  EXPECT_EQ(use.wrapU, gltf::Wrap::clampToEdge);
-  EXPECT_EQ(use.wrapV, gltf::Wrap::mirroredRepeat);
+  EXPECT_EQ(use.wrapU, gltf::Material::Wrap::clampToEdge);
+  EXPECT_EQ(use.wrapV, gltf::Material::Wrap::mirroredRepeat);
   EXPECT_TRUE(model.notes.empty());
 }
 

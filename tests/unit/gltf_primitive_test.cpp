@@ -331,11 +331,11 @@ TEST(GltfPrimitive, ReadsTexcoordsColorsAndMaterial) {
   ASSERT_EQ(model.materials.size(), 2u);
   EXPECT_EQ(model.materials[0].name, "plain");
   EXPECT_EQ(model.materials[0].metallic, 1.0f);
-  EXPECT_EQ(model.materials[0].alphaMode, gltf::AlphaMode::opaque);
+  EXPECT_EQ(model.materials[0].alphaMode, gltf::Material::AlphaMode::opaque);
   EXPECT_EQ(model.materials[1].baseColor, (std::array<float, 4>{0.5f, 0.25f, 0.125f, 1}));
   EXPECT_EQ(model.materials[1].roughness, 0.25f);
   EXPECT_EQ(model.materials[1].emissive, (std::array<float, 3>{1, 0, 0.5f}));
-  EXPECT_EQ(model.materials[1].alphaMode, gltf::AlphaMode::mask);
+  EXPECT_EQ(model.materials[1].alphaMode, gltf::Material::AlphaMode::mask);
   EXPECT_EQ(model.materials[1].alphaCutoff, 0.75f);
   EXPECT_TRUE(model.materials[1].doubleSided);
 

@@ -59,30 +59,28 @@ struct Skin {
   std::string rig = {};
 };
 
-/// How alpha is used, as in glTF 2.0.
-enum class AlphaMode : std::uint8_t { opaque = 0, mask = 1, blend = 2 };
-
 /// An image as it is in the file: PNG or JPEG, not decoded.
 struct Image {
   std::string name;  ///< for messages: "image 2 'skin'"
   std::vector<std::byte> bytes;
 };
 
-/// How texture coordinates outside [0, 1] are used, as in glTF 2.0.
-enum class Wrap : std::uint8_t { repeat = 0, mirroredRepeat = 1, clampToEdge = 2 };
-
-/// A texture of a material.
-struct TextureUse {
-  std::uint32_t image = noIndex;  ///< index into `Model::images`; that image has bytes
-  std::uint32_t texcoord = 0;     ///< n of TEXCOORD_n; a primitive need not have it
-  Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
-};
-
 /// The factors of a material. What the file leaves out has the default of glTF 2.0.
 struct Material {
+  /// How alpha is used, as in glTF 2.0.
+  enum class AlphaMode : std::uint8_t { opaque = 0, mask = 1, blend = 2 };
+  /// How texture coordinates outside [0, 1] are used, as in glTF 2.0.
+  enum class Wrap : std::uint8_t { repeat = 0, mirroredRepeat = 1, clampToEdge = 2 };
+  /// An image, and how it is used.
+  struct Texture {
+    std::uint32_t image = noIndex;  ///< index into `Model::images`; that image has bytes
+    std::uint32_t texcoord = 0;     ///< n of TEXCOORD_n; a primitive need not have it
+    Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
+  };
+
   std::string name;
   std::array<float, 4> baseColor{1, 1, 1, 1};  ///< linear red, green, blue, and alpha
-  TextureUse baseColorTexture;                 ///< only if `LoadOptions::images` is set
+  Texture baseColorTexture;                    ///< only if `LoadOptions::images` is set
   float metallic = 1;
   float roughness = 1;
   std::array<float, 3> emissive{0, 0, 0};

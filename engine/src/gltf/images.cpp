@@ -36,15 +36,15 @@ std::optional<std::string> textIn(const json& value) {
 }
 
 /// glTF 2.0, 5.26.
-Wrap wrapOf(const json& value) {
+Material::Wrap wrapOf(const json& value) {
   const std::optional<std::uint64_t> number = wholeNumber(value);
-  if (number == 33071u) return Wrap::clampToEdge;
-  if (number == 33648u) return Wrap::mirroredRepeat;
-  return Wrap::repeat;
+  if (number == 33071u) return Material::Wrap::clampToEdge;
+  if (number == 33648u) return Material::Wrap::mirroredRepeat;
+  return Material::Wrap::repeat;
 }
 
-TextureUse textureOf(const json& root, const json& material) {
-  TextureUse use;
+Material::Texture textureOf(const json& root, const json& material) {
+  Material::Texture use;
   const json& info = member(member(material, "pbrMetallicRoughness"), "baseColorTexture");
   const std::optional<std::uint64_t> index = wholeNumber(member(info, "index"));
   if (!index) return use;
@@ -141,7 +141,7 @@ Appearance findAppearance(const json& root, MemoryBudget& budget) {
   const json& images = member(root, "images");
   const json& materials = member(root, "materials");
   spend(budget, images.size(), 2 * (sizeof(ImageDescription) + sizeof(Image)), "the images");
-  spend(budget, materials.size(), 2 * sizeof(TextureUse), "the materials");
+  spend(budget, materials.size(), 2 * sizeof(Material::Texture), "the materials");
   for (const json& image : images) {
     appearance.images.push_back({textIn(member(image, "name")).value_or(""),
                                  textIn(member(image, "uri")),
@@ -156,7 +156,7 @@ void readImages(const Appearance& appearance, const Source& source, SideFiles& f
                 MemoryBudget& budget, Model& model) {
   ImageReader images(appearance, source, files, budget, model);
   for (std::size_t i = 0; i < model.materials.size(); ++i) {
-    TextureUse use = appearance.baseColorTextures[i];
+    Material::Texture use = appearance.baseColorTextures[i];
     use.image = images.find(use.image);
     if (use.image != noIndex) model.materials[i].baseColorTexture = use;
   }

@@ -23,7 +23,7 @@ struct ImageDescription {
 /// The images and textures of a file, not checked against the rest of the file.
 struct Appearance {
   std::vector<ImageDescription> images;
-  std::vector<TextureUse> baseColorTextures;  ///< indexed by material
+  std::vector<Material::Texture> baseColorTextures;  ///< indexed by material
 };
 
 /// Extracts what it understands from the JSON and ignores the rest. Spends the memory that this

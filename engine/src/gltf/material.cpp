@@ -7,10 +7,10 @@
 namespace dermis::gltf {
 namespace {
 
-AlphaMode alphaModeOf(const std::string& name) {
-  if (name == "MASK") return AlphaMode::mask;
-  if (name == "BLEND") return AlphaMode::blend;
-  return AlphaMode::opaque;
+Material::AlphaMode alphaModeOf(const std::string& name) {
+  if (name == "MASK") return Material::AlphaMode::mask;
+  if (name == "BLEND") return Material::AlphaMode::blend;
+  return Material::AlphaMode::opaque;
 }
 
 }  // namespace

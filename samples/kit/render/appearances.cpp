@@ -10,22 +10,22 @@ using render::Geometry;
 using render::Surface;
 using render::Transparency;
 
-Transparency transparencyOf(gltf::AlphaMode mode) {
+Transparency transparencyOf(gltf::Material::AlphaMode mode) {
   switch (mode) {
-    case gltf::AlphaMode::mask:
+    case gltf::Material::AlphaMode::mask:
       return Transparency::mask;
-    case gltf::AlphaMode::blend:
+    case gltf::Material::AlphaMode::blend:
       return Transparency::blend;
     default:
       return Transparency::opaque;
   }
 }
 
-render::Wrap wrapOf(gltf::Wrap wrap) {
+render::Wrap wrapOf(gltf::Material::Wrap wrap) {
   switch (wrap) {
-    case gltf::Wrap::mirroredRepeat:
+    case gltf::Material::Wrap::mirroredRepeat:
       return render::Wrap::mirror;
-    case gltf::Wrap::clampToEdge:
+    case gltf::Material::Wrap::clampToEdge:
       return render::Wrap::clamp;
     default:
       return render::Wrap::repeat;
@@ -48,7 +48,7 @@ Surface untexturedSurface(const gltf::Model& model, const gltf::Primitive& primi
 
 }  // namespace
 
-gltf::TextureUse Appearances::textureUse(const gltf::Primitive& primitive) const {
+gltf::Material::Texture Appearances::textureUse(const gltf::Primitive& primitive) const {
   if (primitive.material == noIndex) return {};
   return model_->materials[primitive.material].baseColorTexture;
 }
@@ -64,7 +64,7 @@ Result<std::uint32_t> Appearances::decode(std::uint32_t index,
   return renderer_->addTexture(*pixels, options);
 }
 
-Result<std::uint32_t> Appearances::texture(const gltf::TextureUse& use) {
+Result<std::uint32_t> Appearances::texture(const gltf::Material::Texture& use) {
   if (use.image == noIndex) return 0u;
   const auto [place, isNew] = textures_.emplace(std::tuple(use.image, use.wrapU, use.wrapV), 0);
   if (!isNew) return place->second;
@@ -81,7 +81,7 @@ Result<std::uint32_t> Appearances::texture(const gltf::TextureUse& use) {
 
 Result<Surface> Appearances::surface(const gltf::Primitive& primitive) {
   Surface surface = untexturedSurface(*model_, primitive);
-  const gltf::TextureUse use = textureUse(primitive);
+  const gltf::Material::Texture use = textureUse(primitive);
   if (use.texcoord >= primitive.texcoords.size()) return surface;
   const Result<std::uint32_t> shown = texture(use);
   if (!shown) return shown.error();

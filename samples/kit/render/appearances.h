@@ -27,8 +27,8 @@ class Appearances {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  gltf::TextureUse textureUse(const gltf::Primitive& primitive) const;
-  Result<std::uint32_t> texture(const gltf::TextureUse& use);
+  gltf::Material::Texture textureUse(const gltf::Primitive& primitive) const;
+  Result<std::uint32_t> texture(const gltf::Material::Texture& use);
   /// Returns 0 if the texture is ignored.
   Result<std::uint32_t> decode(std::uint32_t image, const render::TextureOptions& options);
 
@@ -38,7 +38,8 @@ class Appearances {
   std::uint64_t memoryLeft_;  ///< for pixels
   std::map<const gltf::Primitive*, render::Geometry> geometries_;
   /// Textures of the renderer, by image and wrap modes; 0 for an ignored texture.
-  std::map<std::tuple<std::uint32_t, gltf::Wrap, gltf::Wrap>, std::uint32_t> textures_;
+  std::map<std::tuple<std::uint32_t, gltf::Material::Wrap, gltf::Material::Wrap>, std::uint32_t>
+      textures_;
   /// The first texture of each image, which has the pixels; 0 for an ignored image.
   std::map<std::uint32_t, std::uint32_t> firstTextures_;
   std::vector<std::string> notes_;
