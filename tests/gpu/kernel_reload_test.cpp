@@ -34,14 +34,14 @@ class KernelReloadTest : public SystemTest {
   }
 
   PipelineId helper(Kernel kernel) const;
-  KernelReload reload() {
+  RuntimeCompiler::Reload reload() {
     ++frame_;
     return must(compiler_->reload(*context_, frame_, frame_ - 1));
   }
   /// The message that an edit leads to.
   std::string refusal() {
     ++frame_;
-    const Result<KernelReload> reload = compiler_->reload(*context_, frame_, frame_ - 1);
+    const Result<RuntimeCompiler::Reload> reload = compiler_->reload(*context_, frame_, frame_ - 1);
     EXPECT_FALSE(reload.ok());
     return reload ? std::string() : reload.error().message;
   }
@@ -92,7 +92,7 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
 
   folder_->edit("skin.comp", ShaderFolder::storedPosition, ShaderFolder::movedPosition);
   EXPECT_EQ(skin(), original) << "not before the reload";
-  const KernelReload moved = reload();
+  const RuntimeCompiler::Reload moved = reload();
   EXPECT_TRUE(namesOnly(moved.replaced, "skin")) << moved.replaced.size();
   EXPECT_EQ(moved.replaced.size(), moved.changed);
   EXPECT_EQ(compiler_->compiledModules(), compiled + moved.changed) << "not the palette's";
@@ -115,7 +115,7 @@ TEST_F(KernelReloadTest, AnEditedKernelSkinsOtherwiseAndABrokenOneIsNotUsed) {
                 "// Changed.\n#ifndef DERMIS_QUATERNION_GLSL");
   EXPECT_NE(refusal().find("positron"), std::string::npos);
   folder_->edit("skin.comp", ShaderFolder::brokenPosition, ShaderFolder::storedPosition);
-  const KernelReload mended = reload();
+  const RuntimeCompiler::Reload mended = reload();
   EXPECT_TRUE(namesOnly(mended.replaced, "skin")) << "a comment in quaternion.glsl changes no word";
   EXPECT_GT(mended.changed, mended.replaced.size());
   EXPECT_EQ(skin(), original);
@@ -139,7 +139,7 @@ TEST_F(KernelReloadTest, AFileThatIsMissingForAWhileOrOfAnotherVersionIsNotUsed)
   folder_->edit("abi.h", "BINDING_TABLES = 0u", "BINDING_TABLES = 7u");
   EXPECT_NE(refusal().find("abi.h"), std::string::npos);
   folder_->edit("abi.h", "BINDING_TABLES = 7u", "BINDING_TABLES = 0u");
-  const KernelReload again = reload();
+  const RuntimeCompiler::Reload again = reload();
   EXPECT_EQ(again.changed, 1u);
   EXPECT_TRUE(again.replaced.empty());
 }
@@ -178,7 +178,7 @@ TEST_F(KernelReloadTest, ASystemIsReloadedBetweenTwoFrames) {
   };
   runFrame();
   folder_->edit("skin.comp", ShaderFolder::storedPosition, ShaderFolder::movedPosition);
-  const KernelReload moved =
+  const RuntimeCompiler::Reload moved =
       must(compiler_->reload(*context_, engine.frame() + 1, engine.completedFrame()));
   EXPECT_TRUE(namesOnly(moved.replaced, "skin"));
   for (int frame = 0; frame < 4; ++frame) {

@@ -113,18 +113,9 @@ class DERMIS_SHADER_COMPILER_API ShaderCompiler {
 //   Context context = must(Context::create(description));
 //
 //   // Between two frames:
-//   if (Result<KernelReload> reload = compiler.reload(context, frame, completedFrame); !reload)
+//   const auto reload = compiler.reload(context, frame, completedFrame);
+//   if (!reload)
 //     show(reload.error().message);  // "shaders/blend.glsl:31: ..."; the old kernels stay
-
-/// What a reload did.
-struct KernelReload {
-  /// Number of modules with a changed source file. Each was compiled again, or taken from the
-  /// cache.
-  std::uint32_t changed = 0;
-  /// Names of the modules whose SPIR-V changed. The next `record` uses the new SPIR-V.
-  std::vector<std::string> replaced;
-  std::uint32_t pipelines = 0;  ///< number of pipelines that were created for these modules
-};
 
 /// Supplies the kernels of a Context. Unchanged GLSL compiles to the same words as the modules in
 /// the library. A module is compiled when `Context::prepare` first needs it.
@@ -136,6 +127,16 @@ struct KernelReload {
 /// thread calls a function of it. `prepare` may run on other threads during any call.
 class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
  public:
+  /// What a reload did.
+  struct Reload {
+    /// Number of modules with a changed source file. Each was compiled again, or taken from the
+    /// cache.
+    std::uint32_t changed = 0;
+    /// Names of the modules whose SPIR-V changed. The next `record` uses the new SPIR-V.
+    std::vector<std::string> replaced;
+    std::uint32_t pipelines = 0;  ///< number of pipelines that were created for these modules
+  };
+
   /// Compiles nothing yet. `shaderFolder` is DERMIS_SHADER_DIR, or a copy of that folder; it is
   /// only read. `cacheFolder` keeps compiled modules between runs, as
   /// `ShaderCompilerOptions::cacheFolder`. Fails with `ioError` if the folder has no `abi.h`, and
@@ -162,13 +163,13 @@ class DERMIS_RUNTIME_COMPILER_API RuntimeCompiler {
   /// Either all changed modules are swapped or none. Fails with `shaderError` if one does not
   /// compile; the message is the first error of glslang, "FILE:LINE: text (module NAME)". All old
   /// kernels then stay in use until a later call finds another change and compiles it. Until then
-  /// calls return an empty `KernelReload`. Fails with `ioError` if a file cannot be read, with
+  /// calls return an empty `Reload`. Fails with `ioError` if a file cannot be read, with
   /// `invalidArgument` if `abi.h` changed, and as `replaceKernels` does.
   ///
   /// A scene does not skin again because of a reload: instances at rest keep what the
   /// old kernels wrote until their pose is written.
-  Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
-                              std::uint64_t completedFrame);
+  Result<Reload> reload(const vulkan::Context& context, std::uint64_t frame,
+                        std::uint64_t completedFrame);
 
   std::uint32_t compiledModules() const;  ///< modules that glslang compiled so far
   std::uint32_t cachedModules() const;    ///< modules that came from the cache folder so far

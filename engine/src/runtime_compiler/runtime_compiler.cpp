@@ -85,8 +85,8 @@ struct RuntimeCompiler::State {
   Result<std::vector<std::uint32_t>> compile(Module& module);
   void watch(const fs::path& path, fs::file_time_type began);
   bool findStale();
-  Result<KernelReload> reload(const vulkan::Context& context, std::uint64_t frame,
-                              std::uint64_t completedFrame);
+  Result<Reload> reload(const vulkan::Context& context, std::uint64_t frame,
+                        std::uint64_t completedFrame);
 
   fs::path shaderFolder;
   std::mutex mutex;  ///< guards all members below: a thread may call `prepare` while another one
@@ -162,13 +162,13 @@ bool RuntimeCompiler::State::findStale() {
   return found;
 }
 
-Result<KernelReload> RuntimeCompiler::State::reload(const vulkan::Context& context,
-                                                    std::uint64_t frame,
-                                                    std::uint64_t completedFrame) {
+Result<RuntimeCompiler::Reload> RuntimeCompiler::State::reload(const vulkan::Context& context,
+                                                               std::uint64_t frame,
+                                                               std::uint64_t completedFrame) {
   // Also destroys kernels that are no longer used.
   if (Result<std::uint32_t> done = context.replaceKernels({}, frame, completedFrame); !done)
     return done.error();
-  KernelReload reload;
+  Reload reload;
   // Held until the end, so that a `prepare` that finds the old kernels replaced gets the new ones.
   const std::unique_lock lock(mutex, std::try_to_lock);
   if (!lock || !findStale()) return reload;
@@ -227,8 +227,9 @@ vulkan::KernelSource RuntimeCompiler::source() const {
           }};
 }
 
-Result<KernelReload> RuntimeCompiler::reload(const vulkan::Context& context, std::uint64_t frame,
-                                             std::uint64_t completedFrame) {
+Result<RuntimeCompiler::Reload> RuntimeCompiler::reload(const vulkan::Context& context,
+                                                        std::uint64_t frame,
+                                                        std::uint64_t completedFrame) {
   try {
     return state_->reload(context, frame, completedFrame);
   } catch (const std::exception& exception) {

@@ -195,7 +195,7 @@ void Viewer::reloadKernels() {
   const vulkan::Context& context = window_.device().context;
   // [reload]
   // Called between two frames, with the next frame and the newest complete one.
-  const Result<KernelReload> done =
+  const Result<RuntimeCompiler::Reload> done =
       options_.compiler->reload(context, shownFrames_ + 1, shownFrames_);
   if (!done) return fail(ExitStatus::badInput, done.error().message);  // glslang's message
   // [/reload]
