@@ -9,7 +9,6 @@
 #include <vulkan/vulkan.h>
 
 #include "dermis/dermis.h"
-#include "dermis/dermis_compare.h"
 
 enum { VERTEX_COUNT = 200, FRAME_COUNT = 3, STRIDE = 24 };
 

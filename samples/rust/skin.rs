@@ -4,7 +4,7 @@
 //!
 //! There is no binding code: bindgen makes dermis.rs from the header.
 //!
-//!     bindgen --no-prepend-enum-name --allowlist-function 'dermis.*' --allowlist-var 'DERMIS.*' dermis_compare.h -o dermis.rs
+//!     bindgen --no-prepend-enum-name --allowlist-function 'dermis.*' --allowlist-var 'DERMIS.*' dermis.h -o dermis.rs
 //!     rustc -O skin.rs $(pkg-config --libs dermis-c-compare)
 //!
 //! Exit status: 0 success, 1 a vertex is wrong or something failed.

@@ -11,7 +11,6 @@
 
 #include "c_helpers.h"
 #include "dermis/clips.h"
-#include "dermis/dermis_compare.h"
 #include "dermis/gltf.h"
 #include "dermis/verify.h"
 #include "test_paths.h"

@@ -10,7 +10,7 @@
 
 #include "c_helpers.h"
 #include "dermis/cpu.h"
-#include "dermis/dermis_compare.h"
+#include "dermis/dermis.h"
 #include "dermis/verify.h"
 
 namespace dermis::test {

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "c_helpers.h"
-#include "dermis/dermis_compare.h"
 #include "dermis/rig.h"
 #include "dermis/verify.h"
 

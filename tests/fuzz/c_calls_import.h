@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "c_calls.h"
-#include "dermis/dermis_compare.h"
+#include "dermis/dermis.h"
 
 namespace dermis::fuzz {
 

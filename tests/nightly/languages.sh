@@ -28,7 +28,7 @@ if python does-not-exist.glb 2>python.log; then exit 1; fi
 expect "there is no file" python.log
 
 bindgen --no-prepend-enum-name --no-rustfmt-bindings --allowlist-function 'dermis.*' --allowlist-var 'DERMIS.*' \
-  "$source/engine/include/dermis/dermis_compare.h" -o dermis.rs -- -I"$source/engine/include"
+  "$source/engine/include/dermis/dermis.h" -o dermis.rs
 cp "$source/samples/rust/skin.rs" .
 link="-L $libraries -l dermis_compare -l dermis -C link-arg=-Wl,-rpath,$libraries"
 # shellcheck disable=SC2086 # words

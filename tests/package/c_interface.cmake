@@ -1,5 +1,5 @@
 # The C interface as it is installed: the functions that the shared libraries export and the bytes of its structures are those of
-# c_interface.txt; the headers are C99; a program in C++17 needs nothing else. With DERMIS_UPDATE_DOCUMENTS set, the list is written.
+# c_interface.txt; the header is C99; a program in C++17 needs nothing else. With DERMIS_UPDATE_DOCUMENTS set, the list is written.
 include(${CMAKE_CURRENT_LIST_DIR}/package_test.cmake)
 
 set(found "# Functions that libdermis and libdermis_compare export, and bytes of their structures on 64-bit systems. A change is a change of the
@@ -21,13 +21,12 @@ foreach(name IN ITEMS dermis dermis_compare)
   string(APPEND found ${functions})
 endforeach()
 
-set(program "#define DERMIS_VULKAN\n#include \"dermis/dermis_compare.h\"\n#include <stdio.h>\nint main(void) {\n")
+set(program "#define DERMIS_VULKAN\n#include \"dermis/dermis.h\"\n#include <stdio.h>\nint main(void) {\n")
 file(READ "${prefix}/${includeFolder}/dermis/dermis.h" text)
-file(READ "${prefix}/${includeFolder}/dermis/dermis_compare.h" more)
-string(REGEX MATCHALL "typedef struct dermis_[a-z0-9_]+ {" structures "${text}${more}")
+string(REGEX MATCHALL "typedef struct dermis_[a-z0-9_]+ {" structures "${text}")
 list(LENGTH structures count)
 if(count LESS 50)
-  wrong("the headers have only ${count} structures")
+  wrong("the header has only ${count} structures")
 endif()
 list(SORT structures)
 foreach(structure IN LISTS structures)

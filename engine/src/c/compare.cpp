@@ -1,5 +1,5 @@
 // The reference and `diagnose`. They are a separate library, since engines do not ship them.
-#include "dermis/dermis_compare.h"
+#include "dermis/dermis.h"
 
 #include <algorithm>
 #include <initializer_list>

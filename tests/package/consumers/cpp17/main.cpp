@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dermis/dermis.h"
-#include "dermis/dermis_compare.h"
 
 static_assert(__cplusplus == 201703L);
 
