@@ -536,9 +536,10 @@ PosedNode poseNode(const Skeleton& skeleton, std::uint32_t node, std::span<const
     posed.local[3] = {local.translation, 1};
     posed.shift = error.translation;
     const double largest = largestOf(local.scale);
-    posed.turn = error.rotation * largest + error.scale;
+    const double scale = error.scale * (1 + error.rounding);  // M~'s rotation is not exactly one
+    posed.turn = error.rotation * largest + scale;
     posed.warp = (above.spread * error.rotation + above.stretch * error.rounding) * largest +
-                 above.stretch * error.scale;
+                 above.stretch * scale;
   }
   posed.global = above.global * posed.local;
   if (clipError == nullptr) return posed;

@@ -75,7 +75,7 @@ VertexBounds boundsOf(const VertexToSkin& vertex, std::span<const JointError> er
   const BankError error = bankError(vertex, errors, method, conditioning);
   VertexBounds bounds = boundsOf(method, conditioning);
   bounds.position += error.position;
-  // Above the range of float32 the bank may have anything.
+  // Numbers may leave the range of float32, or an inverse bind matrix is singular.
   if (!std::isfinite(bounds.position)) bounds.onlyFinite = bounds.outOfRange = true;
   const auto add = [](double& bound, double more) {
     bound = bound < 0 || !std::isfinite(more) ? -1 : bound + more;
