@@ -83,9 +83,14 @@ INSTANTIATE_TEST_SUITE_P(
                        ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                          Rigidity::mirrored, Rigidity::mirroredAlongOneAxis),
                        ::testing::Values(Case{1, 1, 1}, Case{63, 2, 2}, Case{64, 3, 4},
-                                         Case{65, 300, 4}, Case{1234, 50, 8}, Case{70001, 300, 4},
-                                         Case{5000, 300, 17})),
+                                         Case{65, 300, 4}, Case{1234, 50, 8}, Case{5000, 300, 17})),
     caseName);
+// More vertices than 16 bits count.
+INSTANTIATE_TEST_SUITE_P(LargeRigs, AccuracyTest,
+                         ::testing::Combine(::testing::ValuesIn(allMethods),
+                                            ::testing::Values(Rigidity::shear),
+                                            ::testing::Values(Case{70001, 300, 4})),
+                         caseName);
 
 /// Joints that a test makes itself, each from its own random numbers.
 class JointsTest : public DeviceTest {

@@ -64,7 +64,7 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexAndWhichPoseOfAClipAreWrong) 
 
   const nlohmann::json report = nlohmann::json::parse(readText(json));
   EXPECT_FALSE(report.at("passed").get<bool>());
-  EXPECT_EQ(report.at("models")[0].at("failures"), 2);
+  EXPECT_EQ(report.at("models")[0].at("failures"), 3) << "the pose of clips moves vertices, too";
   std::map<std::string, std::size_t> cases, failed;
   for (const nlohmann::json& verified : report.at("models")[0].at("cases")) {
     EXPECT_EQ(verified.at("passed"), !verified.contains("failure"));
@@ -75,22 +75,26 @@ TEST(WrongBytesCommandsTest, VerifyTellsWhichVertexAndWhichPoseOfAClipAreWrong) 
     ++failed[method];
     const bool isOfClip = method == "clips";
     EXPECT_EQ(verified.at("pose"), "rest pose");
+    EXPECT_GT(verified.at("worstPositionOfBound").get<double>(), 1);
+    if (verified.at("variant") == "in the sampled pose") {
+      EXPECT_GT(verified.at("failures"), 100);
+      continue;
+    }
     EXPECT_EQ(verified.at("variant"),
               isOfClip ? "joint matrices" : "8 invocations, 1 instances each");
     EXPECT_EQ(verified.at("failures"), 1);
-    EXPECT_GT(verified.at("worstPositionOfBound").get<double>(), 1);
     EXPECT_TRUE(verified.at("failure").get<std::string>().starts_with(isOfClip ? whatOfClip : what))
         << verified;
   }
-  EXPECT_EQ(failed, (std::map<std::string, std::size_t>{{"clips", 1}, {"linear", 1}}));
+  EXPECT_EQ(failed, (std::map<std::string, std::size_t>{{"clips", 1}, {"linear", 2}}));
   for (const Method method : allMethods)
     EXPECT_GE(cases[std::string(methodName(method))], 30u) << methodName(method);
 
   const std::string xml = readText(junit);
-  EXPECT_EQ(countOf(xml, "failures=\"2\" errors=\"0\""), 2u) << "of the model, and of all";
+  EXPECT_EQ(countOf(xml, "failures=\"3\" errors=\"0\""), 2u) << "of the model, and of all";
   EXPECT_EQ(countOf(xml, "<failure message=\"" + what), 1u);
   EXPECT_EQ(countOf(xml, "<failure message=\"" + whatOfClip), 1u);
-  EXPECT_EQ(countOf(xml, "<failure"), 2u);
+  EXPECT_EQ(countOf(xml, "<failure"), 3u);
 }
 
 // All bits of a few words of the output of the first frame, and then a bit of the exponent of the
