@@ -97,7 +97,8 @@ class PlayingCrowd : public ClipCrowd {
     Result<reference::SkinnedMesh> expected =
         reference::skin(mesh.view(), pose, Method::dualQuaternion);
     if (!expected) return expected.error();
-    // The bounds are for the same joint matrices. Those of a device may differ by roundings.
+    // The bounds are for the same joint matrices. Those of a device differ by roundings: fitted,
+    // and generous, to find a wrong clip, time or weight.
     for (reference::VertexBounds& bounds : expected->bounds) {
       bounds.position = 16 * bounds.position + 1e-4 * bounds.scale;
       if (bounds.normal >= 0) bounds.normal = 16 * bounds.normal + 1e-4;
