@@ -1550,9 +1550,9 @@ DERMIS_C_API dermis_code dermis_driven_range(const dermis_recorder* recorder, de
 
 #endif  // VULKAN_CORE_H_
 
-// ---- The reference: a library of its own, `dermis_compare`. It says whether skinned vertices are
-// right, and is for tests and debug builds: it is written to be correct, not fast. verify.h
-// describes the reference and the bounds.
+// ---- The reference, in a separate library, `dermis_compare`. It tells whether skinned vertices
+// are right. Use it in tests and debug builds: it is written to be correct, not fast. verify.h
+// describes the reference and its bounds.
 
 // What that library exports.
 #if defined(DERMIS_STATIC) || defined(DERMIS_CDEF)

@@ -4,16 +4,15 @@
 //
 // A joint C = R S of the bank is C~ = Q C + F, with Q a rotation and ‖F‖ ≤ `shape`. Along the path
 // C + s Qᵀ F, with X = Rᵀ Qᵀ F and singular values σ, the derivatives of C = R S are
-// - R' = R Ω, where Ω S + S Ω = X − Xᵀ. For axial vectors of skew matrices, that is a
-// multiplication
-//   by tr S − S, which has the eigenvalues σ2 + σ3, σ1 + σ3 and σ1 + σ2. So |ω| ≤ 2 ‖X‖ / (σ2 +
-//   σ3). The integral is the angle −ln(1 − 2 shape / (σ2 + σ3)), since a σ changes by ‖F‖ at most.
-//   The same holds for the path from C to C~, with `linear` instead of `shape`, if σ3 stays above
-//   0.
+// - R' = R Ω, where Ω S + S Ω = X − Xᵀ. For axial vectors of skew matrices, the left side is a
+//   multiplication by tr S − S, which has the eigenvalues σ2 + σ3, σ1 + σ3 and σ1 + σ2. So
+//   |ω| ≤ 2 ‖X‖ / (σ2 + σ3). The integral is the angle −ln(1 − 2 shape / (σ2 + σ3)), since a σ
+//   changes by ‖F‖ at most. The same holds for the path from C to C~, with `linear` instead of
+//   `shape`, if σ3 stays above 0.
 // - S'ij = ½ (Xij + Xji) + ½ (σi − σj) / (σi + σj) (Xij − Xji) between the eigenvectors i and j.
-// The
-//   first matrix has at most the norm ‖X‖. The second is symmetric without a diagonal, its three
-//   entries have the length D ‖X‖, D = (σ1 − σ3) / (σ1 + σ3), and its norm is at most √(4/3) of it.
+//   The first matrix has at most the norm ‖X‖. The second is symmetric without a diagonal, its
+//   three entries have the length D ‖X‖, D = (σ1 − σ3) / (σ1 + σ3), and its norm is at most √(4/3)
+//   of it.
 // Q turns by 2 asin((linear + shape) / (2 σ2)) at most: (Q − 1) C is as long as that angle's chord,
 // times C's part in the plane of the turn, which is at least σ2. A rotation by φ has a quaternion
 // that is off by 2 sin(φ/4). If σ3 ≤ shape, C~ may be a mirror though C is none.
