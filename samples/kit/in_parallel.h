@@ -32,10 +32,11 @@ class JoiningThreads {
   std::vector<std::thread> threads_;
 };
 
-/// Calls `body(index)` for each index below `count`, in any order and from several threads. Returns
-/// when all calls are done. If calls throw, it throws one of the exceptions.
+/// Calls `body(index)` for each index below `count`, in any order and from this many threads.
+/// Returns when all calls are done. If calls throw, it throws one of the exceptions.
 template <typename Body>
-void inParallel(std::size_t count, const Body& body) {
+void inParallel(std::size_t count, const Body& body,
+                std::size_t threads = std::thread::hardware_concurrency()) {
   std::atomic<std::size_t> next = 0;
   std::mutex mutex;
   std::exception_ptr thrown;
@@ -48,9 +49,9 @@ void inParallel(std::size_t count, const Body& body) {
     }
   };
   {
-    const std::size_t threads = std::min<std::size_t>(std::thread::hardware_concurrency(), count);
     JoiningThreads others;
-    for (std::size_t thread = 1; thread < threads; ++thread) others.start([&work] { work(); });
+    for (std::size_t thread = 1; thread < std::min(threads, count); ++thread)
+      others.start([&work] { work(); });
     work();
   }
   if (thrown) std::rethrow_exception(thrown);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <functional>
@@ -209,15 +208,8 @@ class CpuClipCrowd : public PlayingCrowd {
     if (Result<void> begun = beginFrame(); !begun) return begun.error();
     const Result<std::span<const cpu::PlannedJob>> jobs = runner_.jobs();
     if (!jobs) return jobs.error();
-    std::atomic<std::size_t> next = 0;
-    const auto work = [&] {
-      for (std::size_t job = next++; job < jobs->size(); job = next++) cpu::run((*jobs)[job]);
-    };
-    {
-      JoiningThreads others;
-      for (std::uint32_t thread = 1; thread < threads; ++thread) others.start([&work] { work(); });
-      work();
-    }
+    inParallel(
+        jobs->size(), [&](std::size_t job) { cpu::run((*jobs)[job]); }, threads);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
 
