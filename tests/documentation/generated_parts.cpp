@@ -91,7 +91,7 @@ std::string pipelines() {
 
 /// What decides whether a frame skins an instance: the tables of the library.
 std::string views() {
-  constexpr std::array names{"shown", "leaving", "hidden", "returning"};
+  constexpr std::array names{"leaving", "shown", "hidden", "returning"};
   std::string table = "| view | hide | show | a frame is executed |\n| --- | --- | --- | --- |\n";
   for (std::size_t view = 0; view < viewAfter.size(); ++view) {
     table += std::string("| ") + names[view];
@@ -106,7 +106,7 @@ std::string actionTable() {
   constexpr std::array names{"leave", "settle", "skin on the beat", "skin", "restart"};
   std::string table =
       "| view | nothing | stale | urgent | restart |\n| --- | --- | --- | --- | --- |\n";
-  constexpr std::array views{"shown", "leaving", "hidden", "returning"};
+  constexpr std::array views{"leaving", "shown", "hidden", "returning"};
   for (std::size_t view = 0; view < actions.size(); ++view) {
     table += std::string("| ") + views[view];
     for (const Action action : actions[view])

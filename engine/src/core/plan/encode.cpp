@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -55,7 +56,6 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
                              const PlanSizes& sizes, PlanData& plan, std::uint32_t record) {
   plan_ = &plan;
   work_ = &work;
-  limits_ = limits;
   tuning_ = tuning;
   plan.clear();
   plan.limits = limits;
@@ -97,11 +97,13 @@ void setConstants(DispatchCommand& dispatch, const Push& push) {
 
 }  // namespace
 
-/// Sets the number of workgroups in the push constants too.
+/// Sets the number of workgroups in the push constants too. `known` is the variant's ID, or 0.
 template <typename Push>
-Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push) {
-  const std::uint64_t maximum = std::min(
-      std::uint64_t{limits_.maxWorkgroupCountX} * limits_.maxWorkgroupCountY, maxWorkgroups);
+Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgroups, Push push,
+                                  PipelineId known) {
+  const std::uint64_t maximum =
+      std::min(std::uint64_t{plan_->limits.maxWorkgroupCountX} * plan_->limits.maxWorkgroupCountY,
+               maxWorkgroups);
   if (workgroups > maximum) {
     return Error{ErrorCode::limitExceeded, "the batch needs " + std::to_string(workgroups) +
                                                " workgroups in one dispatch; the maximum is " +
@@ -109,11 +111,11 @@ Result<void> Encoder::addDispatch(const Variant& variant, std::uint64_t workgrou
   }
   dispatches_.emplace_back().variant = variant;
   DispatchCommand& dispatch = dispatches_.back().command;
-  dispatch.pipeline = variant.id();
+  dispatch.pipeline = known != PipelineId{} ? known : variant.id();
   dispatch.workgroupCount = push.workgroupCount = static_cast<std::uint32_t>(workgroups);
   setConstants(dispatch, push);
   dispatch.groupCountY =
-      static_cast<std::uint32_t>(divideUp(workgroups, limits_.maxWorkgroupCountX));
+      static_cast<std::uint32_t>(divideUp(workgroups, plan_->limits.maxWorkgroupCountX));
   dispatch.groupCountX = static_cast<std::uint32_t>(divideUp(workgroups, dispatch.groupCountY));
   return {};
 }
@@ -151,7 +153,7 @@ Result<void> Encoder::addFigureDispatches() {
     }
     count += records.size();
   }
-  if (Result<void> good = addDispatch(poseVariant(Kernel::sample, limits_, tuning_), count,
+  if (Result<void> good = addDispatch(poseVariant(Kernel::sample, plan_->limits, tuning_), count,
                                       abi::SamplePush{figures, 0});
       !good)
     return good;
@@ -160,8 +162,8 @@ Result<void> Encoder::addFigureDispatches() {
     for (std::uint32_t buffer = 0; buffer < work_->figures.size(); ++buffer) {
       const std::size_t here = work_->figures[buffer].size();
       if (here == 0) continue;
-      if (Result<void> good = addDispatch(poseVariant(Kernel::compose, limits_, tuning_), here,
-                                          abi::ComposePush{first, 0, band});
+      if (Result<void> good = addDispatch(poseVariant(Kernel::compose, plan_->limits, tuning_),
+                                          here, abi::ComposePush{first, 0, band});
           !good)
         return good;
       first += static_cast<std::uint32_t>(here) * abi::FIGURE_WORDS;
@@ -192,7 +194,7 @@ Result<void> Encoder::addRigDispatches() {
       store(tables, tables.size() - abi::RIG_WORDS, record);
     }
     const auto count = static_cast<std::uint32_t>(rig.poses.size());
-    if (Result<void> good = addDispatch(poseVariant(Kernel::rig, limits_, tuning_),
+    if (Result<void> good = addDispatch(poseVariant(Kernel::rig, plan_->limits, tuning_),
                                         divideUp(count, tuning_.workgroupSize),
                                         abi::RigPush{rig.words, first, count, 0});
         !good)
@@ -207,26 +209,20 @@ Result<void> Encoder::addRigDispatches() {
 }
 
 Result<void> Encoder::addPaletteDispatches() {
-  paletteWords_.clear();
-  for (const Work::Poses& lists : work_->poses) {
-    for (std::size_t form = 0; form < paletteFormCount; ++form) {
-      for (std::size_t promise = 0; promise < jointPromiseCount; ++promise) {
-        paletteWords_.push_back(wordsOf(plan_->tables));
-        if (lists.records[form][promise].empty()) continue;
-        const Variant variant =
-            paletteVariant(static_cast<PaletteForm>(form), static_cast<JointPromise>(promise),
-                           lists.drivenBuffer != notUsed, limits_, tuning_);
-        if (Result<void> good = addPaletteDispatch(variant, lists, form, promise); !good)
-          return good;
-      }
+  paletteWords_.resize(work_->poses.size() * paletteKindCount);
+  for (std::size_t index = 0; index < work_->poses.size(); ++index) {
+    const Work::Poses& poses = work_->poses[index];
+    for (std::uint32_t rest = poses.filled; rest != 0; rest &= rest - 1) {
+      const auto kind = static_cast<std::uint32_t>(std::countr_zero(rest));
+      paletteWords_[index * paletteKindCount + kind] = wordsOf(plan_->tables);
+      if (Result<void> good = addPaletteDispatch(poses, kind); !good) return good;
     }
   }
   return {};
 }
 
 /// One workgroup per palette.
-Result<void> Encoder::addPaletteDispatch(const Variant& variant, const Work::Poses& poses,
-                                         std::size_t form, std::size_t promise) {
+Result<void> Encoder::addPaletteDispatch(const Work::Poses& poses, std::uint32_t kind) {
   std::vector<std::uint32_t>& tables = plan_->tables;
   const auto append = [&tables](const auto& records) {
     const std::uint32_t first = wordsOf(tables);
@@ -235,15 +231,19 @@ Result<void> Encoder::addPaletteDispatch(const Variant& variant, const Work::Pos
     if (size != 0) std::memcpy(&tables[first], records.data(), size);
     return first;
   };
-  const auto& records = poses.records[form][promise];
-  const std::uint32_t first = append(records), driven = append(poses.driven[form][promise]);
+  const auto& [records, drivenRecords] = poses.lists[kind];
+  const std::uint32_t first = append(records), driven = append(drivenRecords);
+  const Variant variant = paletteVariant(static_cast<PaletteForm>(kind / jointPromiseCount),
+                                         static_cast<JointPromise>(kind % jointPromiseCount),
+                                         poses.drivenBuffer != notUsed, plan_->limits, tuning_);
   if (Result<void> good = addDispatch(variant, records.size(), abi::PalettePush{first, 0, driven});
       !good)
     return good;
-  dispatches_.back().stage = paletteStage_;
-  dispatches_.back().joints = poses.joints;
-  dispatches_.back().poseBuffer = poses.buffer;
-  dispatches_.back().drivenBuffer = poses.drivenBuffer;
+  Dispatch& dispatch = dispatches_.back();
+  dispatch.stage = paletteStage_;
+  dispatch.joints = poses.joints;
+  dispatch.poseBuffer = poses.buffer;
+  dispatch.drivenBuffer = poses.drivenBuffer;
   return {};
 }
 
@@ -255,7 +255,7 @@ Result<void> Encoder::addClearDispatch() {
   tables.insert(tables.end(), work_->clearedResults.begin(), work_->clearedResults.end());
   alignToUnit(tables);
   return addDispatch(
-      variantOf(Kernel::clear, limits_, tuning_),
+      variantOf(Kernel::clear, plan_->limits, tuning_),
       divideUp(work_->clearedResults.size(), tuning_.workgroupSize),
       abi::ClearPush{first, static_cast<std::uint32_t>(work_->clearedResults.size()), 0});
 }
@@ -272,7 +272,7 @@ void Encoder::chooseVerticesPerInvocation(std::span<const std::uint32_t> groups)
   // Enough for the threads of a CPU. A guess: measured with two threads only.
   constexpr std::uint64_t minWorkgroups = 32;
   verticesPerInvocation_ = 1;
-  if (!limits_.texelBuffers) return;
+  if (!plan_->limits.texelBuffers) return;
   std::uint64_t instances = 0;
   for (const std::uint32_t group : groups) instances += work_->groups[group].instances;
   const auto workgroups = [&] {
@@ -345,7 +345,8 @@ Result<void> Encoder::addDispatches() {
     const abi::SkinPush push{static_cast<std::uint32_t>(groupRecords + begin * abi::GROUP_WORDS),
                              static_cast<std::uint32_t>(end - begin), 0, instanceRecords,
                              verticesPerInvocation_};
-    if (Result<void> good = addDispatch(variant, workgroups, push); !good) return good;
+    if (Result<void> good = addDispatch(variant, workgroups, push, group.key.pipeline); !good)
+      return good;
     Dispatch& dispatch = dispatches_.back();
     dispatch.windows = group.key.windows;
     dispatch.instancesPerInvocation = mostInstances;
@@ -434,7 +435,7 @@ Result<void> Encoder::addMorphLists() {
       store(tables, tables.size() - abi::MORPH_LIST_WORDS, listRecords_[i]);
     }
     const std::uint32_t count = (wordsOf(tables) - first) / abi::MORPH_LIST_WORDS;
-    if (Result<void> good = addDispatch(variantOf(Kernel::morphLists, limits_, tuning_),
+    if (Result<void> good = addDispatch(variantOf(Kernel::morphLists, plan_->limits, tuning_),
                                         divideUp(count, tuning_.workgroupSize),
                                         abi::MorphListPush{first, count, 0});
         !good)
@@ -513,7 +514,7 @@ std::uint32_t Encoder::figureWord(const Candidate& candidate) const {
 std::uint32_t Encoder::paletteWord(const Candidate& candidate) const {
   const PalettePlace& palette = candidate.palette;
   if (palette.index == notUsed) return abi::CANDIDATE_NEEDS_NONE;
-  return paletteWords_[palette.list()] + palette.index * abi::PALETTE_WORDS;
+  return paletteWords_[palette.list] + palette.index * abi::PALETTE_WORDS;
 }
 
 /// In the order of the instance records.
@@ -574,16 +575,16 @@ void Encoder::appendCulledDispatches() {
 Result<void> Encoder::addVisibilityDispatches(std::uint32_t record) {
   visibility_[0].command.workgroupCount = culledGroups_;
   const std::uint32_t most = std::max(culledGroups_, visibility_[1].command.workgroupCount);
-  if (most > limits_.maxWorkgroupCountX) {
+  if (most > plan_->limits.maxWorkgroupCountX) {
     return Error{ErrorCode::limitExceeded,
                  "instances that are culled on the GPU have " + std::to_string(most) +
                      " combinations of mesh and layout, but the device allows at most " +
-                     std::to_string(limits_.maxWorkgroupCountX) + " workgroups"};
+                     std::to_string(plan_->limits.maxWorkgroupCountX) + " workgroups"};
   }
   culled_.frame = record;
-  culled_.maxWorkgroups = limits_.maxWorkgroupCountX;
+  culled_.maxWorkgroups = plan_->limits.maxWorkgroupCountX;
   for (const std::uint32_t pass : {abi::VISIBILITY_CHOOSES, abi::VISIBILITY_COUNTS}) {
-    visibility_[pass].variant = variantOf(Kernel::visibility, limits_, tuning_);
+    visibility_[pass].variant = variantOf(Kernel::visibility, plan_->limits, tuning_);
     DispatchCommand& dispatch = visibility_[pass].command;
     dispatch.pipeline = visibility_[pass].variant.id();
     dispatch.groupCountX = dispatch.workgroupCount;
@@ -626,18 +627,19 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
   } else if (variant.kernel == Kernel::skin) {
     parts[abi::BINDING_MESHES] = buffers[BufferRole::meshes];
     parts[abi::BINDING_PALETTES] = joints;
-    const std::uint64_t range = limits_.maxStorageBufferRange;
+    const std::uint64_t range = plan_->limits.maxStorageBufferRange;
     for (std::size_t stream = 0; stream < streamCount; ++stream) {
       BufferPart& part = parts[abi::BINDING_POSITIONS + stream];
       part = parts[abi::BINDING_POSITIONS];
       if (!writesStream(variant, stream)) continue;
       part = buffers.parts[static_cast<std::size_t>(BufferRole::positions) + stream];
       if (part.size > range) {
-        const std::uint64_t step = outputWindowStep(limits_);
+        const std::uint64_t step = outputWindowStep(plan_->limits);
         // Without separate ranges all outputs that have several windows have the same one.
-        const std::uint64_t begin = (limits_.separateRanges ? dispatch.windows[stream]
-                                                            : std::ranges::max(dispatch.windows)) *
-                                    step;
+        const std::uint64_t begin =
+            (plan_->limits.separateRanges ? dispatch.windows[stream]
+                                          : std::ranges::max(dispatch.windows)) *
+            step;
         part.offset = std::min(begin, (part.size - 1) / step * step);
         part.size = std::min(part.size - part.offset, range);
       }
@@ -666,7 +668,7 @@ void Encoder::listDispatch(const Dispatch& dispatch, const PlanBuffers& buffers)
       parts[abi::BINDING_DRIVEN] = orElse(driven, parts[abi::BINDING_MESHES]);
     parts[abi::BINDING_RESULTS] = orElse(results, palettes);
   }
-  const std::uint32_t count = limits_.maxStorageBuffersPerStage < storageBuffersWanted
+  const std::uint32_t count = plan_->limits.maxStorageBuffersPerStage < storageBuffersWanted
                                   ? abi::MIN_BINDING_COUNT
                                   : abi::BINDING_COUNT;
   std::vector<Binding>& bindings = plan_->bindings;

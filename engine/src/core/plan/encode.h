@@ -52,15 +52,15 @@ class Encoder {
   Result<void> addFigureDispatches();
   Result<void> addRigDispatches();
   Result<void> addPaletteDispatches();
-  Result<void> addPaletteDispatch(const Variant& variant, const Work::Poses& poses,
-                                  std::size_t form, std::size_t promise);
+  Result<void> addPaletteDispatch(const Work::Poses& poses, std::uint32_t kind);
   Result<void> addClearDispatch();
   std::uint64_t vertexGroupsOf(const Group& group) const;
   void chooseVerticesPerInvocation(std::span<const std::uint32_t> groups);
   std::uint32_t instancesPerInvocation(std::span<const std::uint32_t> groups) const;
   Result<void> addDispatches();
   template <typename Push>
-  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push);
+  Result<void> addDispatch(const Variant& variant, std::uint64_t workgroups, Push push,
+                           PipelineId known = {});
   void writeInstances();
   void markEvenlySpaced(std::uint32_t firstRecord);
   std::uint32_t appendExtension(const InstanceExtras& extras);
@@ -75,7 +75,6 @@ class Encoder {
 
   PlanData* plan_ = nullptr;
   const Work* work_ = nullptr;
-  DeviceLimits limits_;
   Tuning tuning_;
   std::uint32_t paletteStage_ = 0;           ///< of the palette kernel
   std::vector<std::uint32_t> figureWords_;   ///< of the first record of each pose buffer

@@ -143,8 +143,8 @@ inline bool hasResult(const Job& job) {
 
 /// The form of a joint in the palettes buffer.
 enum class PaletteForm : std::uint8_t { dualQuaternions, logarithms, matrices };
-inline constexpr std::size_t paletteFormCount = 3;
-inline constexpr std::size_t jointPromiseCount = 3;
+inline constexpr std::uint32_t paletteFormCount = 3;
+inline constexpr std::uint32_t jointPromiseCount = 3;
 
 /// The form that a method reads. In a batch, matrices are not copied to the palettes buffer but
 /// read in place.

@@ -260,12 +260,11 @@ void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>&
 void Work::begin(Groups& groupsInUse) {
   groups_ = &groupsInUse;
   ++number_;
-  for (Poses& lists : poses) {
-    for (auto& ofForm : lists.records) {
-      for (std::vector<abi::PaletteRecord>& records : ofForm) records.clear();
-    }
-    for (auto& ofForm : lists.driven) {
-      for (std::vector<abi::DrivenRecord>& records : ofForm) records.clear();
+  for (Poses& of : poses) {
+    for (; of.filled != 0; of.filled &= of.filled - 1) {
+      Poses::List& list = of.lists[static_cast<std::size_t>(std::countr_zero(of.filled))];
+      list.records.clear();
+      list.driven.clear();
     }
   }
   banks.clear();

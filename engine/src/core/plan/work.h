@@ -163,18 +163,13 @@ struct InstanceExtras {
 /// bits.
 void assignActive(std::span<const MorphWeight> morphs, std::vector<MorphWeight>& active);
 
+/// Palettes are converted by form and promise: `form` × `jointPromiseCount` + `promise`.
+inline constexpr std::uint32_t paletteKindCount = paletteFormCount * jointPromiseCount;
+
 /// Where a palette that is converted is in the work.
 struct PalettePlace {
-  std::uint32_t buffers = 0;  ///< index into `Work::poses`
-  PaletteForm form = PaletteForm::dualQuaternions;
-  JointPromise promise = JointPromise::scaling;
-  std::uint32_t index = notUsed;  ///< in the list of these
-
-  /// The number of the list.
-  std::size_t list() const {
-    return (buffers * paletteFormCount + static_cast<std::size_t>(form)) * jointPromiseCount +
-           static_cast<std::size_t>(promise);
-  }
+  std::uint32_t list = 0;         ///< index into `Work::poses` × `paletteKindCount` + kind
+  std::uint32_t index = notUsed;  ///< in this list
 };
 
 /// The data with which the GPU decides whether an instance is skinned.
@@ -198,15 +193,16 @@ struct PoseSource {
 
 /// Call `begin`, add palettes and instances in any order, then `arrange`.
 struct Work {
-  /// Poses of one pose buffer, by form and promise; with a rig, those whose driven joints are in
-  /// one buffer.
+  /// Poses of one pose buffer; with a rig, those whose driven joints are in one buffer.
   struct Poses {
+    struct List {
+      std::vector<abi::PaletteRecord> records;
+      std::vector<abi::DrivenRecord> driven;  ///< of the same palettes; only with a rig
+    };
     std::uint32_t buffer = 0, drivenBuffer = notUsed;
     BufferRole joints = BufferRole::poses;
-    template <typename Record>
-    using ByKind = std::array<std::array<std::vector<Record>, jointPromiseCount>, paletteFormCount>;
-    ByKind<abi::PaletteRecord> records;
-    ByKind<abi::DrivenRecord> driven;  ///< the same palettes; only with a rig
+    std::uint32_t filled = 0;  ///< bit `kind`: the list has poses
+    std::array<List, paletteKindCount> lists;
   };
   /// A bank that figures play.
   struct Bank {
@@ -271,17 +267,17 @@ struct Work {
   PalettePlace addPose(const PoseSource& source, std::uint32_t outputUnit, std::uint32_t joints,
                        PaletteForm form, JointPromise promise, bool isNeeded = true) {
     const std::uint32_t buffers = buffersOf(source);
-    Poses& lists = poses[buffers];
-    lists.joints = source.role;
-    std::vector<abi::PaletteRecord>& records =
-        lists.records[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)];
-    records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
-    if (source.drivenBuffer != notUsed) {
-      lists.driven[static_cast<std::size_t>(form)][static_cast<std::size_t>(promise)].push_back(
-          {source.drivenUnit, source.writtenJoints, 0, 0});
-    }
+    const std::uint32_t kind =
+        static_cast<std::uint32_t>(form) * jointPromiseCount + static_cast<std::uint32_t>(promise);
+    Poses& of = poses[buffers];
+    of.joints = source.role;
+    of.filled |= 1u << kind;
+    Poses::List& list = of.lists[kind];
+    list.records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
+    if (source.drivenBuffer != notUsed)
+      list.driven.push_back({source.drivenUnit, source.writtenJoints, 0, 0});
     ++poseCount;
-    return {buffers, form, promise, static_cast<std::uint32_t>(records.size() - 1)};
+    return {buffers * paletteKindCount + kind, static_cast<std::uint32_t>(list.records.size() - 1)};
   }
   /// What it points to must stay valid while the work is read.
   void add(const Instance& instance) {

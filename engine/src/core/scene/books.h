@@ -416,21 +416,23 @@ struct SceneBooks {
   void gatherResults();
   void readEarlierBoxes(std::span<const NotedBox> boxes);
   void readHistory(std::span<const std::byte> records);
-  void addDue(std::uint32_t index, bool restarts);
-  void addRuns(const SceneInstance& instance, std::uint32_t flags, const Candidate* candidate);
+  void addDue(std::uint32_t index, SceneInstance& instance, bool restarts);
+  void addRuns(const SceneInstance& instance, std::uint32_t palette, std::uint32_t flags,
+               const Candidate* candidate = nullptr);
   bool isOnBeat(std::uint32_t interval, std::uint32_t pose) const;
   bool holds(std::uint32_t index) const;
-  void noteBox(std::uint32_t index, BoxChange change);
+  void noteBox(std::uint32_t index, const SceneInstance& instance, BoxChange change) {
+    if (states_[index].interpolates && instance.bounds)
+      notedBoxes_.push_back({instance.extras.result, change, instance.firstFrame});
+  }
   /// After record number `record`, modulo 2³².
   static View viewOf(const InstanceState& state, std::uint32_t record) {
     return state.turned == record ? state.view : after(state.view, ViewEvent::execute);
   }
   /// Whether the view has changed.
   static bool turn(InstanceState& state, std::uint32_t record, bool isVisible) {
-    const View before = viewOf(state, record);
-    const View view = after(before, isVisible ? ViewEvent::show : ViewEvent::hide);
-    if (view == before) return false;
-    state.view = view;
+    if (isDisplayed(state.view) == isVisible) return false;
+    state.view = after(viewOf(state, record), isVisible ? ViewEvent::show : ViewEvent::hide);
     state.turned = record;
     return true;
   }
@@ -440,7 +442,7 @@ struct SceneBooks {
     return actionFor(viewOf(state, recordNumber()), need,
                      state.updateInterval == 1 || isOnBeat(state.updateInterval, pose));
   }
-  void convertPalette(const SceneInstance& instance, bool isCulled);
+  std::uint32_t convertPalette(const SceneInstance& instance, bool isCulled);
   std::uint32_t paletteUnit(const SceneInstance& instance) const;
   bool commitShift(SceneInstance& instance, InstanceHandle handle);
   void commitInstance(std::uint32_t index);

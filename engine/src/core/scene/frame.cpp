@@ -42,12 +42,6 @@ bool SceneBooks::holds(std::uint32_t index) const {
   return frame_ - instance.updatedIn < instance.updatedInterval;
 }
 
-void SceneBooks::noteBox(std::uint32_t index, BoxChange change) {
-  const SceneInstance& instance = instances_.at(index);
-  if (states_[index].interpolates && instance.bounds)
-    notedBoxes_.push_back({instance.extras.result, change, instance.firstFrame});
-}
-
 std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
   const auto form = static_cast<std::size_t>(paletteForm(instance.method));
   return poses_.at(instance.pose).forms[form].unit;
@@ -55,12 +49,13 @@ std::uint32_t SceneBooks::paletteUnit(const SceneInstance& instance) const {
 
 /// Converts a pose once for all instances that read it, and only if one does. If all of these are
 /// culled on the GPU, it decides whether a figure is sampled and its pose converted: the CPU does
-/// not know whether that happened, and lists both again in the next frame.
-void SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
+/// not know whether that happened, and lists both again in the next frame. Returns `paletteUnit`.
+std::uint32_t SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
   const PaletteForm form = paletteForm(instance.method);
   ScenePose& pose = poses_.at(instance.pose);
   ScenePose::Form& converted = pose.forms[static_cast<std::size_t>(form)];
-  if (converted.version == pose.version || converted.plannedIn == planNumber_) return;
+  if (converted.version == pose.version || converted.plannedIn == planNumber_)
+    return converted.unit;
   converted.plannedIn = planNumber_;
   const bool isNeeded = !isCulled || pose.figure == notUsed;
   const bool isDriven = pose.rig != notUsed && pose.drivenVersion != pose.version;
@@ -83,12 +78,14 @@ void SceneBooks::convertPalette(const SceneInstance& instance, bool isCulled) {
   }
   converted.place =
       work_.addPose(source, converted.unit, pose.jointCount, form, pose.promise, isNeeded);
+  return converted.unit;
 }
 
-void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
+void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t palette, std::uint32_t flags,
                          const Candidate* candidate) {
   const InstanceExtras* extras = instance.extras.isNeeded() ? &instance.extras : nullptr;
-  const std::uint32_t palette = paletteUnit(instance);
+  const bool listsMorphs = extras != nullptr && extras->writtenMorphs + extras->drivenMorphs != 0 &&
+                           (flags & abi::INSTANCE_SETTLES) == 0 && !owner_.isCpu;
   const auto add = [&](const PlacedRun& run) {
     const Work::Instance skinned{&run, extras, instance.pose, palette, flags};
     if (candidate != nullptr) {
@@ -96,9 +93,7 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t flags,
     } else {
       work_.add(skinned);
     }
-    const bool isListed = (flags & abi::INSTANCE_SETTLES) == 0 && !owner_.isCpu;
-    if (isListed && instance.extras.writtenMorphs + instance.extras.drivenMorphs != 0)
-      listMorphs(instance);
+    if (listsMorphs) listMorphs(instance);
   };
   add(instance.run);
   for (const PlacedRun& run : instance.furtherRuns) add(run);
@@ -116,18 +111,17 @@ void SceneBooks::gatherPoses() {
   posed_.clear();
 }
 
-void SceneBooks::addDue(std::uint32_t index, bool restarts) {
-  SceneInstance& instance = instances_.at(index);
+void SceneBooks::addDue(std::uint32_t index, SceneInstance& instance, bool restarts) {
   instance.plannedIn = planNumber_;
   due_.push_back({index, restarts});
-  convertPalette(instance, false);
+  const std::uint32_t palette = convertPalette(instance, false);
   if (owner_.isCpu && instance.morphWriter == MorphWriter::clips) sampleMorphs(instance);
-  addRuns(instance, states_[index].hasMotion && restarts ? abi::INSTANCE_RESTARTS : 0u, nullptr);
+  addRuns(instance, palette, restarts && states_[index].hasMotion ? abi::INSTANCE_RESTARTS : 0u);
   if (instance.extras.result != notUsed) {
     work_.clearedResults.push_back(instance.extras.result);
     plannedResults_.push_back(instance.extras.result);
   }
-  noteBox(index, restarts ? BoxChange::rests : BoxChange::moves);
+  noteBox(index, instance, restarts ? BoxChange::rests : BoxChange::moves);
   planned_.skinnedVertices += instance.vertexCount;
   planned_.writtenBytes += std::uint64_t{instance.vertexCount} * instance.vertexBytes;
 }
@@ -145,8 +139,9 @@ void SceneBooks::gatherPending() {
       state->isListed = false;
       continue;
     }
-    const Action action = actionOf(*state, instances_.at(handle.index).pose, state->need);
-    if (action >= Action::skin) addDue(handle.index, action == Action::restart);
+    SceneInstance& instance = instances_.at(handle.index);
+    const Action action = actionOf(*state, instance.pose, state->need);
+    if (action >= Action::skin) addDue(handle.index, instance, action == Action::restart);
     pending_[kept++] = handle;
   }
   pending_.resize(kept);
@@ -168,8 +163,8 @@ void SceneBooks::gatherSettling() {
     }
     instance->plannedIn = planNumber_;
     settling_.push_back(handle.index);
-    noteBox(handle.index, BoxChange::rests);
-    addRuns(*instance, abi::INSTANCE_SETTLES, nullptr);
+    noteBox(handle.index, *instance, BoxChange::rests);
+    addRuns(*instance, paletteUnit(*instance), abi::INSTANCE_SETTLES);
   }
 }
 
@@ -197,7 +192,7 @@ void SceneBooks::gatherCulled() {
       if (instance.firstFrame == 0) work_.clearedResults.push_back(instance.extras.result);
       plannedResults_.push_back(instance.extras.result);
     }
-    convertPalette(instance, true);
+    const std::uint32_t palette = convertPalette(instance, true);
     Candidate candidate{index, version};
     const ScenePose& pose = poses_.at(instance.pose);
     const PaletteForm form = paletteForm(instance.method);
@@ -211,11 +206,12 @@ void SceneBooks::gatherCulled() {
     const bool restarts = isNew && (state.need == Need::restart || action == Action::restart);
     const bool isHeld = !isNew && holds(index);
     if (isNew) {
-      noteBox(index, restarts ? BoxChange::rests : BoxChange::moves);
+      noteBox(index, instance, restarts ? BoxChange::rests : BoxChange::moves);
     } else {
-      noteBox(index, isHeld ? BoxChange::mayBeSkinned : BoxChange::rests);
+      noteBox(index, instance, isHeld ? BoxChange::mayBeSkinned : BoxChange::rests);
     }
-    addRuns(instance, culledFlags(instance, state.hasMotion, restarts, isHeld), &candidate);
+    addRuns(instance, palette, culledFlags(instance, state.hasMotion, restarts, isHeld),
+            &candidate);
   }
 }
 

@@ -561,7 +561,7 @@ Result<void> Scene::setVisibility(std::span<const InstanceVisibility> instances)
   const std::span<InstanceState> states = books.states_;
   const std::uint32_t record = books.recordNumber();
   for (const InstanceVisibility& wanted : instances) {
-    const InstanceHandle handle = wanted.instance;
+    const InstanceHandle& handle = wanted.instance;
     const bool isKnown = handle.index < states.size() && handle &&
                          states[handle.index].generation == handle.generation;
     if (!isKnown || wanted.updateInterval == 0) {

@@ -8,10 +8,10 @@
 
 namespace dermis {
 
-/// Whether the last frame displayed an instance, and whether the next one will.
+/// Whether the last frame displayed an instance, and whether the next one will, which is bit 0.
 enum class View : std::uint8_t {
-  shown,      ///< both; so begins a new instance
   leaving,    ///< the last one did
+  shown,      ///< both; so begins a new instance
   hidden,     ///< neither
   returning,  ///< the next one will
 };
@@ -21,8 +21,8 @@ enum class ViewEvent : std::uint8_t { hide, show, execute };
 
 inline constexpr std::array<std::array<View, 3>, 4> viewAfter{{
     //                hide           show             execute
-    /* shown     */ {View::leaving, View::shown, View::shown},
     /* leaving   */ {View::leaving, View::shown, View::hidden},
+    /* shown     */ {View::leaving, View::shown, View::shown},
     /* hidden    */ {View::hidden, View::returning, View::hidden},
     /* returning */ {View::hidden, View::returning, View::shown},
 }};
@@ -31,7 +31,7 @@ constexpr View after(View view, ViewEvent event) {
   return viewAfter[static_cast<std::size_t>(view)][static_cast<std::size_t>(event)];
 }
 constexpr bool isDisplayed(View view) {
-  return view == View::shown || view == View::returning;
+  return (static_cast<unsigned>(view) & 1) != 0;
 }
 
 /// What is out of date about the vertices of an instance. A change may only raise it; once it is
@@ -55,8 +55,8 @@ enum class Action : std::uint8_t {
 
 inline constexpr std::array<std::array<Action, 4>, 4> actions{{
     //                none            stale            urgent           restart
-    /* shown     */ {Action::settle, Action::onBeat, Action::skin, Action::restart},
     /* leaving   */ {Action::leave, Action::leave, Action::leave, Action::leave},
+    /* shown     */ {Action::settle, Action::onBeat, Action::skin, Action::restart},
     /* hidden    */ {Action::leave, Action::leave, Action::leave, Action::leave},
     /* returning */ {Action::settle, Action::restart, Action::restart, Action::restart},
 }};
