@@ -226,7 +226,7 @@ struct IndexRange {
 /// VkDrawIndexedIndirectCommand, which is D3D12_DRAW_INDEXED_ARGUMENTS, too.
 struct IndexedDraw {
   std::uint32_t indexCount = 0;
-  std::uint32_t instanceCount = 0;  ///< 1, or 0 if vertices are not there
+  std::uint32_t instanceCount = 0;  ///< 1, or 0 before it was skinned (`isWritten`)
   std::uint32_t firstIndex = 0;
   std::int32_t vertexOffset = 0;    ///< the first vertex of the instance in the output buffer
   std::uint32_t firstInstance = 0;  ///< position in the list
@@ -355,11 +355,11 @@ class DERMIS_CORE_API Scene {
   /// Removes an instance and its output.
   Result<void> removeInstance(InstanceHandle instance);
 
-  /// What `vulkan::Context::prepare` needs before such an instance is recorded. If both handles are
-  /// valid, only for instances with the same method whose mesh has the same minimum and maximum of
-  /// influences and whose pose is like this one in its promise, as that of a figure, and by having
-  /// a rig: two kernels for most instances. If a handle is null, for any mesh or pose: about ten.
-  /// With a null pose, figures and rigs count only if the scene has some: set
+  /// What `vulkan::Context::prepare`, or `pipelines` (plan.h), needs for such an instance. If both
+  /// handles are valid, only for instances with the same method whose mesh has the same minimum and
+  /// maximum of influences and whose pose is like this one in its promise, as that of a figure, and
+  /// by having a rig: two kernels for most instances. If a handle is null, for any mesh or pose:
+  /// about ten. With a null pose, figures and rigs count only if the scene has some: set
   /// `PipelineNeeds::figures` and `rigs` before that. Fails with `invalidArgument` if the method is
   /// not valid, or if the layout breaks a rule of `OutputAttribute`, and as `placeVertices` does.
   Result<PipelineNeeds> pipelineNeeds(const InstanceDescription& description) const;
@@ -452,11 +452,11 @@ class DERMIS_CORE_API Scene {
   /// Fills `draws`, one for each of `instances`, for one indirect draw from the beginning of the
   /// output buffer. It needs the features drawIndirectFirstInstance and multiDrawIndirect. For
   /// instances with `culledOnGpu`, let what writes the visibility buffer set `instanceCount`, too:
-  /// they are skinned in the same frame, while the count here lags behind. `indices` are
-  /// the ranges of all meshes, by `MeshHandle::index`. Fails with `invalidArgument` if the sizes of
-  /// both lists differ, for a mesh without a range, for a layout that is not interleaved and for
-  /// one with another stride than the first; with `limitExceeded` for a first vertex beyond 2³¹
-  /// − 1. The message names the instance by its position in the list.
+  /// they are skinned in the same frame, while the count here lags behind, and stays 1. `indices`
+  /// are the ranges of all meshes, by `MeshHandle::index`. Fails with `invalidArgument` if the
+  /// sizes of both lists differ, for a mesh without a range, for a layout that is not interleaved
+  /// and for one with another stride than the first; with `limitExceeded` for a first vertex beyond
+  /// 2³¹ − 1. The message names the instance by its position in the list.
   Result<void> indexedDraws(std::span<const InstanceHandle> instances,
                             std::span<const IndexRange> indices,
                             std::span<IndexedDraw> draws) const;
@@ -505,14 +505,17 @@ class DERMIS_CORE_API Scene {
 //     commands.commit();
 //     draw from the buffer `commands.outputBuffer()` at scene.output(instance)
 //
-// Buffers have numbers, which the scene chooses. The sample own_rhi of Dermis is such an engine.
+// The pipelines to build while loading are `pipelines(scene.pipelineNeeds(instance), limits,
+// tuning)`; vulkan/context.h describes each. Commands have the barriers between them; the engine
+// adds those between `Use::dermis` and its own uses of the output. Buffers have numbers, which the
+// scene chooses. The sample own_rhi of Dermis is such an engine.
 
 /// A buffer that a scene asks for.
 struct SceneBuffer {
   std::uint32_t number = 0;  ///< by which commands name it; no other buffer of the scene gets it
   BufferRole role = BufferRole::output;
-  /// Its usage includes what the scene copies; the engine adds its own, for example VERTEX_BUFFER
-  /// for `output`.
+  /// Its usage includes what the commands copy and upload; the engine adds its own, for example
+  /// VERTEX_BUFFER for `output`.
   BufferRequirement requirement;
   /// Whether the scene writes it (`poses`) or reads it (`readBack`) through a mapping, if it gets
   /// one. The memory is then host-coherent, and for `readBack` host-cached if possible.

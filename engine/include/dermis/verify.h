@@ -65,7 +65,8 @@ struct SkinnedMesh {
 ///   Magnenat-Thalmann 2005 for logarithms; Kavan and Žára 2005 for spherical blending; Hejl 2004
 ///   for quaternions and translations; Le and Hodgins 2016 for centers of rotation.
 /// - All methods except `linear` apply scale and shear in two phases, by polar decomposition. The
-///   reference decomposes every joint; the kernels take nearly rigid joints for rigid.
+///   reference decomposes every joint; the kernels take nearly rigid joints for rigid. For a pose
+///   with `JointPromise::scaleIgnored`, pass joints without scale.
 /// - Normals are transformed by the cofactor matrix of the blended 3×3 matrix, tangents by the
 ///   blended 3×3 matrix. Both are normalized. Tangents are not made orthogonal to normals. The
 ///   handedness is multiplied by the sign of the determinant.

@@ -4,6 +4,7 @@
 //
 //     vulkan::SceneRecorder recorder = *vulkan::SceneRecorder::create(context);
 //     Scene& scene = recorder.scene();
+//     recorder.prepare(instance);   // while loading, for each kind of instance
 //
 // and in each frame:
 //
@@ -158,9 +159,9 @@ class DERMIS_VULKAN_API SceneRecorder {
   /// Records the uploads and the commands of the frame, with the barriers between them. Records
   /// nothing if nothing changed and no instance is culled on the GPU. Call it once after each
   /// `beginFrame`, outside a render pass, with a primary or secondary command buffer. Before it the
-  /// engine records the barrier between `Use::dermis` and the last use of the output, and of what
-  /// `poseRange` and `drivenRange` name, and after it the barrier between `Use::dermis` and the
-  /// next use.
+  /// engine records the barrier between the last use, if any, of the output, and of what
+  /// `poseRange` and `drivenRange` name, and `Use::dermis`, and after it the barrier between
+  /// `Use::dermis` and the next use.
   ///
   /// `visibility` is required if instances are `culledOnGpu`: a part of a buffer with
   /// VK_BUFFER_USAGE_STORAGE_BUFFER_BIT that holds `Scene::visibilityCount` words of 4 bytes. An
