@@ -183,6 +183,8 @@ class DERMIS_VULKAN_API SceneRecorder {
 
   /// The buffer that holds all outputs as of the last `record`: one that the recorder created, or
   /// the buffer of `SceneRecorderDescription::output`. Offsets of outputs count from its beginning.
+  /// To read vertices on the CPU, record a barrier from `Use::dermis` to `Use::copyRead`, copy
+  /// them, and record one from `Use::copyWrite` to `Use::hostRead`.
   VkBuffer outputBuffer() const;
   /// A number that changes whenever `outputBuffer` becomes another buffer: when it grew, or when
   /// the frame in which it grew was abandoned. Offsets stay the same when it grows.
