@@ -506,9 +506,9 @@ class DERMIS_CORE_API Scene {
 //     draw from the buffer `commands.outputBuffer()` at scene.output(instance)
 //
 // The pipelines to build while loading are `pipelines(scene.pipelineNeeds(instance), limits,
-// tuning)`; vulkan/context.h describes each. Commands have the barriers between them; the engine
-// adds those between `Use::dermis` and its own uses of the output. Buffers have numbers, which the
-// scene chooses. The sample own_rhi of Dermis is such an engine.
+// tuning)`; `vulkan::pipelineDescription` has each. Commands have the barriers between them; the
+// engine adds those between `Use::dermis` and its own uses of the output. Buffers have numbers,
+// which the scene chooses. The sample own_rhi of Dermis is such an engine.
 
 /// A buffer that a scene asks for.
 struct SceneBuffer {

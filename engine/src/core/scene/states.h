@@ -2,6 +2,7 @@
 // tables below, from which docs/states.md is made.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -33,6 +34,12 @@ constexpr View after(View view, ViewEvent event) {
 constexpr bool isDisplayed(View view) {
   return (static_cast<unsigned>(view) & 1) != 0;
 }
+// Showing what is displayed, or hiding what is not, changes nothing: `SceneBooks::turn` uses that.
+static_assert(std::ranges::all_of(viewAfter, [](const auto& row) {
+  const auto view = static_cast<View>(&row - viewAfter.data());
+  return isDisplayed(row[1]) && !isDisplayed(row[0]) && isDisplayed(row[2]) == isDisplayed(view) &&
+         row[isDisplayed(view) ? 1 : 0] == view;
+}));
 
 /// What is out of date about the vertices of an instance. A change may only raise it; once it is
 /// skinned, it is `none`.
