@@ -20,10 +20,9 @@ constexpr double sector = 32;  // bytes that a cache transfers together
 constexpr std::uint32_t influences = 4, instancesEach = 4;
 
 // SPIR-V 1.3, section 3.32.
-constexpr std::uint32_t opExtInst = 12, opTypeFloat = 22, opTypeVector = 23, opLoopMerge = 246,
-                        opLabel = 248, opFunction = 54, opFNegate = 127, opFAdd = 129, opFSub = 131,
-                        opFMul = 133, opFDiv = 136, opFRem = 140, opFMod = 141,
-                        opVectorTimesScalar = 142;
+constexpr std::uint32_t opTypeFloat = 22, opTypeVector = 23, opLoopMerge = 246, opLabel = 248,
+                        opFNegate = 127, opFAdd = 129, opFSub = 131, opFMul = 133, opFDiv = 136,
+                        opFRem = 140, opFMod = 141, opVectorTimesScalar = 142;
 
 bool isArithmetic(std::uint32_t opcode) {
   return opcode == opFNegate || opcode == opFAdd || opcode == opFSub || opcode == opFMul ||

@@ -14,8 +14,7 @@ namespace dermis::cli {
 namespace {
 
 // SPIR-V 1.3, section 3.32: first and last opcodes of the groups of instructions that are counted.
-constexpr std::uint32_t opFunction = 54, opFunctionEnd = 56;
-constexpr std::uint32_t opExtInst = 12;
+constexpr std::uint32_t opFunctionEnd = 56;
 constexpr std::uint32_t opLoad = 61, opStore = 62;
 constexpr std::uint32_t opConvertFToU = 109, opQuantizeToF16 = 116;
 constexpr std::uint32_t opSNegate = 126, opSMulExtended = 152;

@@ -9,6 +9,9 @@
 
 namespace dermis::cli {
 
+/// Opcodes. SPIR-V 1.3, section 3.32.
+inline constexpr std::uint32_t opExtInst = 12, opFunction = 54;
+
 /// A kernel with specialized constants, all functions inlined, and dead code removed. Empty if
 /// SPIRV-Tools fail, or if the command was built without them.
 std::vector<std::uint32_t> specializedSpirv(const vulkan::PipelineDescription& pipeline);

@@ -52,12 +52,6 @@ FileBuilder fox() {
   return file;
 }
 
-std::string writeModel(const std::string& name, const FileBuilder& file) {
-  std::string path = outFile(name);
-  std::ofstream(path, std::ios::binary) << file.text();
-  return path;
-}
-
 /// The pose that the command writes; empty where it does not.
 Ply skinned(const std::string& model, const std::vector<std::string>& more = {}) {
   const std::string out = outFile("pose.ply");
@@ -70,7 +64,8 @@ Ply skinned(const std::string& model, const std::vector<std::string>& more = {})
 }
 
 Ply skinnedByReference(const FileBuilder& file, const std::string& method = "dual_quaternion") {
-  return skinned(writeModel("model.gltf", file), {"--device", "reference", "--method", method});
+  return skinned(file.writtenTo(outFile("model.gltf")),
+                 {"--device", "reference", "--method", method});
 }
 
 /// Two files that must be skinned alike.
@@ -89,7 +84,7 @@ void expectSamePose(const FileBuilder& file, const FileBuilder& expected) {
 
 /// Expects that `info` counts the problem and that `skin` says so and goes on, unless strict.
 void expectCounted(const FileBuilder& file, MeshProblem problem, int count, int firstVertex) {
-  const std::string model = writeModel("counted.gltf", file);
+  const std::string model = file.writtenTo(outFile("counted.gltf"));
   const Json info = Json::parse(dermis({"info", model, "--json"}).output);
   const Json& problems = info.at("meshes").at(0).at("problems");
   const auto found = std::find_if(problems.begin(), problems.end(), [&](const Json& entry) {
@@ -121,7 +116,7 @@ std::vector<std::string> devicesToTry() {
 void skinEverywhere(const FileBuilder& file, const std::string& ending,
                     const std::function<void(const std::string& out)>& check,
                     const std::vector<std::string>& devices = devicesToTry()) {
-  const std::string model = writeModel("model.gltf", file), out = outFile("pose" + ending);
+  const std::string model = file.writtenTo(outFile("model.gltf")), out = outFile("pose" + ending);
   for (const std::string& device : devices) {
     for (const Method method : allMethods) {
       if (device == "cpu" && isForComparison(method)) continue;
@@ -226,7 +221,7 @@ void expectRepaired(const LineMesh& mesh, const BrokenMesh& broken, const std::s
 /// The file is skinned with a warning, which may say more, and refused where strict.
 void expectWarning(const FileBuilder& file, const std::string& sentence,
                    const std::string& more = {}) {
-  const std::string model = writeModel("broken.gltf", file), out = outFile("broken.ply");
+  const std::string model = file.writtenTo(outFile("broken.gltf")), out = outFile("broken.ply");
   const CommandResult lenient = dermis({"skin", model, "-o", out, "--device", "cpu"});
   EXPECT_EQ(lenient.status, 0);
   EXPECT_NE(lenient.errors.find("dermis: warning: " + sentence + more + "; repaired\n"),
@@ -244,13 +239,13 @@ void expectWarning(const FileBuilder& file, const std::string& sentence,
 // A rule of glTF is broken, and what is meant is clear all the same.
 TEST_F(BadInput, ABrokenRuleIsNotedAndRefusedWhereStrict) {
   FileBuilder file = skinnedTriangle();
-  const std::string whole = writeModel("whole.gltf", file);
+  const std::string whole = file.writtenTo(outFile("whole.gltf"));
   file.json["skins"][0]["inverseBindMatrices"] =
       file.addFloats({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1,
                       1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
                      "MAT4");
   file.json["bufferViews"].back()["byteStride"] = 64;
-  const std::string broken = writeModel("rule.gltf", file);
+  const std::string broken = file.writtenTo(outFile("rule.gltf"));
   const std::string sentence =
       "skin 0 inverseBindMatrices: bufferView 3 of accessor 3 has a byteStride of 64, which only "
       "vertex attributes may have";
@@ -322,8 +317,8 @@ TEST_F(BadInput, BadJointsPositionsWeightsCountsAndStridesAreReportedRefusedAndR
   // Views that make no sense do not get past the importer.
   FileBuilder counts = fox();
   counts.attributes()["WEIGHTS_0"] = counts.addFloats({1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
-  const CommandResult refused = dermis(
-      {"skin", writeModel("counts.gltf", counts), "-o", outFile("counts.ply"), "--device", "cpu"});
+  const CommandResult refused = dermis({"skin", counts.writtenTo(outFile("counts.gltf")), "-o",
+                                        outFile("counts.ply"), "--device", "cpu"});
   EXPECT_EQ(refused.status, 3);
   expectOneErrorLine(refused);
 }
@@ -377,14 +372,14 @@ TEST_F(BadInput, RotationKeysThatAreNotOfUnitLengthAreNormalizedAndCounted) {
   const FileBuilder file = rotating({0, 1}, {0, 0, 0, 7, 0, 0, 3, 3}, "LINEAR");
   const float half = std::sqrt(0.5f);
   const FileBuilder unit = rotating({0, 1}, {0, 0, 0, 1, 0, 0, half, half}, "LINEAR");
-  const CommandResult info = dermis({"info", writeModel("keys.gltf", file)});
+  const CommandResult info = dermis({"info", file.writtenTo(outFile("keys.gltf"))});
   EXPECT_NE(info.output.find("output: the rotation of key 0 has a length of 7, not 1 (and 1 more"),
             std::string::npos)
       << info.output;
   for (const char* time : {"0", "0.3", "1"}) {
     const std::vector<std::string> at{"--device", "cpu", "--time", time};
-    const Ply a = skinned(writeModel("keys.gltf", file), at),
-              b = skinned(writeModel("unit.gltf", unit), at);
+    const Ply a = skinned(file.writtenTo(outFile("keys.gltf")), at),
+              b = skinned(unit.writtenTo(outFile("unit.gltf")), at);
     ASSERT_EQ(a.positions.size(), 3u);
     for (std::size_t i = 0; i < 9; ++i)
       EXPECT_NEAR(a.positions[i / 3][i % 3], b.positions.at(i / 3)[i % 3], 1e-6f) << time;
@@ -581,7 +576,7 @@ TEST_F(BadInput, TruncatedOrHostileGltfEndsWithAClearErrorAndNeverWithMore) {
   const auto expectHostile = [](const std::string& expected, auto change) {
     FileBuilder file = fox();
     change(file);
-    expectRefusedSoon(writeModel("hostile.gltf", file), expected);
+    expectRefusedSoon(file.writtenTo(outFile("hostile.gltf")), expected);
   };
   expectHostile("accessor 0", [](FileBuilder& f) { f.accessor("POSITION")["count"] = 4294967295; });
   expectHostile("POSITION has 2000000000", [](FileBuilder& f) {
@@ -616,14 +611,14 @@ FileBuilder copies(std::size_t nodes, std::size_t primitives, std::size_t vertic
 // 64 MiB and 64 times the file; and what has no end in memory has none in time.
 TEST_F(BadInput, NothingThatAFileMultipliesIsMadeBeyondItsBudget) {
   const std::string limit = "than the limit for a file of this size";
-  expectRefusedSoon(writeModel("parts.gltf", copies(5000, 5000, 3)), limit);
-  expectRefusedSoon(writeModel("vertices.gltf", copies(400, 1, 100'000)), limit);
+  expectRefusedSoon(copies(5000, 5000, 3).writtenTo(outFile("parts.gltf")), limit);
+  expectRefusedSoon(copies(400, 1, 100'000).writtenTo(outFile("vertices.gltf")), limit);
   FileBuilder name = copies(1, 20'000, 3);
   name.json["nodes"][0]["name"] = std::string(1'000'000, 'N');
-  expectRefusedSoon(writeModel("name.gltf", name), limit);
+  expectRefusedSoon(name.writtenTo(outFile("name.gltf")), limit);
   FileBuilder targets = copies(20'000, 1, 3);
   targets.primitive()["targets"] = std::vector<Json>(100'000, Json::object());
-  expectRefusedSoon(writeModel("targets.gltf", targets), limit);
+  expectRefusedSoon(targets.writtenTo(outFile("targets.gltf")), limit);
 }
 
 TEST_F(BadInput, FilesThatAreNoModelsAreRefusedBeforeTheyAreRead) {
@@ -640,7 +635,7 @@ TEST_F(BadInput, MorphTargetsOfNothingAreRefused) {
   FileBuilder file = fox();
   file.primitive()["targets"] = {{{"POSITION", file.attributes()["POSITION"]}}};
   file.attributes() = Json::object();
-  expectRefusedSoon(writeModel("nothing.gltf", file), "morph targets, but no attribute");
+  expectRefusedSoon(file.writtenTo(outFile("nothing.gltf")), "morph targets, but no attribute");
 }
 
 // Skins that a mesh cannot tell apart share what is made of it; its clip has a channel a node.
@@ -656,7 +651,7 @@ TEST_F(BadInput, ManyNodesAreSkinnedInATimeThatGrowsWithTheirNumber) {
   }
   file.json["animations"] = {
       {{"samplers", {{{"input", keys}, {"output", keys}}}}, {"channels", channels}}};
-  EXPECT_EQ(skinned(writeModel("nodes.gltf", file), {"--device", "cpu"}).positions.size(),
+  EXPECT_EQ(skinned(file.writtenTo(outFile("nodes.gltf")), {"--device", "cpu"}).positions.size(),
             3 * count);
 }
 
@@ -671,7 +666,7 @@ TEST_F(BadInput, NamesArePrintedShortAndOnOneLine) {
   file.json["skins"][0]["name"] = name;
   file.attributes()["WEIGHTS_0"] =
       file.addFloats({1, 0, 0, 0, nan, 0, 0, 0, 0.5f, 0, 0, 0}, "VEC4");
-  const std::string model = writeModel("names.gltf", file);
+  const std::string model = file.writtenTo(outFile("names.gltf"));
   const auto expectTame = [&](const std::string& text) {
     EXPECT_LT(text.size(), 3000u);
     EXPECT_NE(text.find("'\\n\\u001b[31m\\u202eAAA"), std::string::npos) << text.substr(0, 3000);
@@ -712,7 +707,7 @@ FileBuilder denseMesh(std::uint32_t vertexCount) {
 
 // Nobody waits for centres of rotation unless a method that needs them was named.
 TEST_F(BadInput, CentresOfRotationTakeLongOnlyIfTheyAreAskedFor) {
-  const std::string model = writeModel("dense.gltf", denseMesh(34'000));
+  const std::string model = denseMesh(34'000).writtenTo(outFile("dense.gltf"));
   const std::string report = outFile("dense.json");
   const CommandResult compared =
       dermis({"compare", model, "--device", "cpu", "--json", report, "--repetitions", "1"});
@@ -727,7 +722,7 @@ TEST_F(BadInput, CentresOfRotationTakeLongOnlyIfTheyAreAskedFor) {
 }
 
 TEST_F(BadInput, AMeshTooDenseForCentresOfRotationIsSkinnedWithoutThem) {
-  const std::string model = writeModel("dense.gltf", denseMesh(110'000));
+  const std::string model = denseMesh(110'000).writtenTo(outFile("dense.gltf"));
   const std::string out = outFile("dense.ply");
   const auto skin = [&](const char* method) {
     return dermis({"skin", model, "-o", out, "--device", "cpu", "--method", method});
@@ -763,7 +758,7 @@ TEST_F(BadInput, CentresOfRotationAreFoundOncePerMesh) {
     file.json["scenes"][0]["nodes"].push_back(file.json["nodes"].size());
     file.json["nodes"].push_back({{"mesh", 0}, {"skin", skin}});
   }
-  const std::string model = writeModel("skins.gltf", file);
+  const std::string model = file.writtenTo(outFile("skins.gltf"));
   const CommandResult result = dermis({"skin", model, "-o", outFile("skins.ply"), "--device", "cpu",
                                        "--method", "center_of_rotation"});
   EXPECT_EQ(result.status, 0) << result.errors;
@@ -822,8 +817,8 @@ FileBuilder strip(std::uint32_t vertices, std::uint32_t materials, std::uint32_t
 /// Expects that each of the primitives of `shared` is skinned as the only one of `single` is.
 void expectSkinnedAlike(const FileBuilder& shared, std::size_t materials, const FileBuilder& single,
                         const std::vector<std::string>& options) {
-  const Ply one = skinned(writeModel("single.gltf", single), options);
-  const Ply all = skinned(writeModel("shared.gltf", shared), options);
+  const Ply one = skinned(single.writtenTo(outFile("single.gltf")), options);
+  const Ply all = skinned(shared.writtenTo(outFile("shared.gltf")), options);
   ASSERT_FALSE(one.positions.empty());
   ASSERT_EQ(all.positions.size(), one.positions.size() * materials);
   for (std::size_t i = 0; i < all.positions.size(); ++i) {
@@ -883,13 +878,14 @@ TEST_F(BadInput, PairsOfSharedAccessorsAreCounted) {
     }
   }
   file.json["meshes"][0]["primitives"] = primitives;
-  expectRefusedSoon(writeModel("pairs.gltf", file), "than the limit for a file of this size");
+  expectRefusedSoon(file.writtenTo(outFile("pairs.gltf")),
+                    "than the limit for a file of this size");
 }
 
 // ---- no Vulkan loader, no device, a missing feature
 
 TEST_F(BadInput, NoLoaderNoDeviceOrAMissingFeatureIsNamedAndTheReferenceStillWorks) {
-  const std::string model = writeModel("model.gltf", fox());
+  const std::string model = fox().writtenTo(outFile("model.gltf"));
   const std::string folder = outFile("libraries");
   std::filesystem::create_directory(folder);
   std::ofstream(folder + "/libvulkan.so.1") << "This is no library.";

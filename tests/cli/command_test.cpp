@@ -390,11 +390,6 @@ TEST(CommandTest, DevicesListsTheDevice) {
   EXPECT_EQ(result.output.substr(line, place - line), std::to_string(before / 3));
 }
 
-std::string readText(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 std::size_t countOf(const std::string& text, const std::string& part) {
   std::size_t count = 0;
   for (std::size_t place = 0; (place = text.find(part, place)) != std::string::npos; ++place)

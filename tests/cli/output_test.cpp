@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <set>
@@ -30,12 +29,6 @@ CommandResult skin(const std::string& model, const std::string& out,
   std::vector<std::string> arguments{"skin", model, "-o", out, "--device", "cpu"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return dermis(arguments);
-}
-
-std::string writeModel(const std::string& name, const FileBuilder& file) {
-  std::string path = outFile(name);
-  std::ofstream(path) << file.text();
-  return path;
 }
 
 /// One pose in all three formats.
@@ -139,7 +132,7 @@ TEST(OutputTest, KeepsWhatSkinningLeavesAsItIs) {
   file.attributes()["TEXCOORD_1"] =
       file.add<std::uint16_t>({0, 65535, 0, 0, 65535, 0}, "VEC2", unsignedShortType, true);
   file.attributes()["COLOR_0"] = file.addFloats({1, 0, 0, 0, 0.5f, 0, 0, 0, 1}, "VEC3");
-  const Pose pose = skinToAll(writeModel("kept.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("kept.gltf")));
   expectSame(pose);
   ASSERT_EQ(pose.glb.parts.size(), 1u);
   const GlbPart& part = pose.glb.parts[0];
@@ -177,7 +170,7 @@ TEST(OutputTest, MendsInAGlbWhatGltfForbids) {
        {"alphaMode", "MASK"},
        {"alphaCutoff", -1}}};
   file.primitive()["material"] = 0;
-  const Pose pose = skinToAll(writeModel("mended.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("mended.gltf")));
   expectSame(pose);
   const GlbPart& part = pose.glb.parts.at(0);
   EXPECT_EQ(pose.ply.normals.at(0), (std::array<float, 3>{0, 0, 0})) << "a zero normal stays zero";
@@ -213,15 +206,15 @@ void expectTangents(const GlbPart& part, const std::vector<std::array<float, 4>>
 
 TEST(OutputTest, TangentsAreSkinnedIntoAGlb) {
   FileBuilder file = turnedTriangle();
-  const Pose pose = skinToAll(writeModel("turned.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("turned.gltf")));
   expectSame(pose);
   expectTangents(pose.glb.parts.at(0), {{0, 1, 0, 1}, {-1, 0, 0, -1}, {-0.6f, 0, 0.8f, 1}});
   file.json["meshes"][0]["weights"] = {1};
-  expectTangents(skinToAll(writeModel("morphed.gltf", file)).glb.parts.at(0),
+  expectTangents(skinToAll(file.writtenTo(outFile("morphed.gltf"))).glb.parts.at(0),
                  {{-1, 0, 0, 1}, {-1, 0, 0, -1}, {-0.6f, 0, 0.8f, 1}});
   // A mirror turns the handedness over.
   file.json["nodes"][1]["scale"] = {1, 1, -1};
-  expectTangents(skinToAll(writeModel("mirrored.gltf", file)).glb.parts.at(0),
+  expectTangents(skinToAll(file.writtenTo(outFile("mirrored.gltf"))).glb.parts.at(0),
                  {{-1, 0, 0, -1}, {-1, 0, 0, 1}, {-0.6f, 0, -0.8f, -1}});
 }
 
@@ -229,7 +222,7 @@ TEST(OutputTest, TheDeviceSkinsTheSameTangents) {
   REQUIRE_DEVICE();
   FileBuilder file = turnedTriangle();
   file.json["meshes"][0]["weights"] = {0.25};
-  const std::string model = writeModel("device.gltf", file);
+  const std::string model = file.writtenTo(outFile("device.gltf"));
   ASSERT_EQ(dermis({"skin", model, "-o", outFile("device.glb")}).status, 0);
   ASSERT_EQ(skin(model, outFile("cpu.glb")).status, 0);
   const Glb expected = readGlb(outFile("cpu.glb"));
@@ -243,7 +236,7 @@ TEST(OutputTest, APartWithoutInfluencesKeepsItsTangentsButForItsMorphs) {
   file.attributes().erase("WEIGHTS_0");
   file.json["meshes"][0]["weights"] = {0.5};
   const float root = std::sqrt(0.5f);
-  expectTangents(skinToAll(writeModel("bind.gltf", file)).glb.parts.at(0),
+  expectTangents(skinToAll(file.writtenTo(outFile("bind.gltf"))).glb.parts.at(0),
                  {{root, root, 0, 1}, {0, 1, 0, -1}, {0, 0.6f, 0.8f, 1}});
 }
 
@@ -255,7 +248,7 @@ TEST(OutputTest, TangentsThatCannotStandInAGlbAreMended) {
   file.primitive().erase("targets");
   file.attributes()["TANGENT"] =
       file.addFloats({0, 0, 0, 0.5f, 0, 30, 0, -7, nan, 0, 0, 1}, "VEC4");
-  const Pose pose = skinToAll(writeModel("mended.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("mended.gltf")));
   const GlbPart& part = pose.glb.parts.at(0);
   ASSERT_EQ(part.tangents.size(), 3u);
   for (std::size_t vertex = 0; vertex < 3; ++vertex) {
@@ -274,9 +267,9 @@ TEST(OutputTest, TangentsWithoutNormalsOrTrianglesAreLeftOut) {
   file.primitive().erase("targets");
   FileBuilder points = file;
   points.primitive()["mode"] = 0;
-  EXPECT_TRUE(skinToAll(writeModel("points.gltf", points)).glb.parts.at(0).tangents.empty());
+  EXPECT_TRUE(skinToAll(points.writtenTo(outFile("points.gltf"))).glb.parts.at(0).tangents.empty());
   file.attributes().erase("NORMAL");
-  EXPECT_TRUE(skinToAll(writeModel("normals.gltf", file)).glb.parts.at(0).tangents.empty());
+  EXPECT_TRUE(skinToAll(file.writtenTo(outFile("normals.gltf"))).glb.parts.at(0).tangents.empty());
 }
 
 // The triangle's mesh with a second primitive before and after it: points without texture
@@ -293,7 +286,7 @@ TEST(OutputTest, PointsAndStripsKeepTheirVertices) {
   strip["attributes"]["TEXCOORD_0"] = texcoords;
   file.json["meshes"][0]["primitives"] = {points, triangle, strip};
   file.json["meshes"][0]["primitives"][1]["attributes"]["TEXCOORD_0"] = texcoords;
-  const Pose pose = skinToAll(writeModel("mixed.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("mixed.gltf")));
   expectSame(pose);
   ASSERT_EQ(pose.glb.parts.size(), 3u);
   EXPECT_EQ(pose.ply.positions.size(), 9u) << "shared accessors repeat their vertices";
@@ -306,7 +299,7 @@ TEST(OutputTest, PointsAndStripsKeepTheirVertices) {
 }
 
 TEST(OutputTest, NormalsThatAreMissingAreComputed) {
-  const Pose pose = skinToAll(writeModel("normals.gltf", skinnedTriangle()));
+  const Pose pose = skinToAll(skinnedTriangle().writtenTo(outFile("normals.gltf")));
   expectSame(pose);
   for (const auto& normal : pose.glb.parts.at(0).normals) {
     EXPECT_EQ(normal, (std::array<float, 3>{0, 0, 1}));
@@ -319,7 +312,7 @@ TEST(OutputTest, NamesCannotBreakAFile) {
   file.json["nodes"].push_back(file.json["nodes"][0]);
   file.json["nodes"].push_back({{"mesh", 0}, {"skin", 0}});
   file.json["scenes"][0]["nodes"] = {0, 1, 3, 4};
-  const Pose pose = skinToAll(writeModel("names.gltf", file));
+  const Pose pose = skinToAll(file.writtenTo(outFile("names.gltf")));
   expectSame(pose);
   ASSERT_EQ(pose.glb.parts.size(), 3u);
   EXPECT_EQ(pose.glb.parts[0].name, "a b\nf 1 1 1\\\n#\tc");
@@ -339,7 +332,7 @@ TEST(OutputTest, IndicesThatDoNotFitIntoSixteenBitsAreThirtyTwo) {
         {"WEIGHTS_0", file.addFloats(Floats(vertices * 4, 0.25f), "VEC4")}};
     const auto last = static_cast<std::uint32_t>(vertices - 1);
     file.primitive()["indices"] = file.add<std::uint32_t>({0, 1, last}, "SCALAR", unsignedIntType);
-    const Pose pose = skinToAll(writeModel("large.gltf", file));
+    const Pose pose = skinToAll(file.writtenTo(outFile("large.gltf")));
     expectSame(pose);
     const Json& primitive = pose.glb.json.at("meshes").at(0).at("primitives").at(0);
     EXPECT_EQ(pose.glb.json.at("accessors")
@@ -354,7 +347,7 @@ TEST(OutputTest, OnlyAPlyHoldsWhatIsNotFinite) {
   // Each scale fits into float32, their product does not.
   file.json["nodes"][1]["scale"] = {1e30, 1, 1};
   file.json["nodes"][2]["scale"] = {1e30, 1, 1};
-  const std::string model = writeModel("infinite.gltf", file);
+  const std::string model = file.writtenTo(outFile("infinite.gltf"));
   const CommandResult ply = skin(model, outFile("infinite.ply"));
   EXPECT_EQ(ply.status, 0);
   EXPECT_NE(ply.errors.find("dermis: warning: "), std::string::npos) << ply.errors;

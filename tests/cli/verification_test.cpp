@@ -6,7 +6,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -107,11 +106,6 @@ TEST(TargetPoolTest, DoesWithoutTargetsThatCannotBeMade) {
   EXPECT_EQ(asked, 2);
 }
 
-std::string readText(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 /// With 1 and 3 threads the reports and the output are equal. Returns the path of one in JSON.
 std::string expectTheSameInThreads(std::vector<std::string> command) {
   const std::string json = outFile("verify.json"), junit = outFile("verify.xml");
@@ -204,12 +198,6 @@ std::map<std::string, std::size_t> casesByMethod(const std::string& json) {
   return count;
 }
 
-std::string write(const FileBuilder& file, const std::string& name) {
-  const std::string path = outFile(name);
-  std::ofstream(path) << file.text();
-  return path;
-}
-
 /// Clips of a model: all have one channel.
 void addClip(FileBuilder& file, const char* name, int node, const char* path,
              const std::vector<float>& times, std::size_t values) {
@@ -228,7 +216,7 @@ std::string modelWithClips(const std::string& name) {
   addClip(file, "bend", 2, "rotation", {0, 1},
           file.addFloats({0, 0, 0, 1, 0.6f, 0, 0, 0.8f}, "VEC4"));
   addClip(file, "grow", 0, "weights", {0, 2}, file.addFloats({0.25f, 0.75f}, "SCALAR"));
-  return write(file, name);
+  return file.writtenTo(outFile(name));
 }
 
 // Each of the threads opens the device. That the report is the same for any number of them is
@@ -312,8 +300,8 @@ TEST(VerificationTest, ClipsThatCannotBePackedAreAWarning) {
   addClip(file, "fast", 2, "rotation", {0, 0.001f, 0.002f, 5000},
           file.addFloats({0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC4"));
   const std::string json = outFile("fast.json");
-  const CommandResult result =
-      dermis({"verify", write(file, "fast.gltf"), "--quick", "--device", "cpu", "--json", json});
+  const CommandResult result = dermis({"verify", file.writtenTo(outFile("fast.gltf")), "--quick",
+                                       "--device", "cpu", "--json", json});
   EXPECT_EQ(result.status, 0) << result.output << result.errors;
   EXPECT_NE(result.errors.find("clips are not verified: "), std::string::npos) << result.errors;
   EXPECT_FALSE(casesByMethod(json).contains("clips"));

@@ -81,7 +81,7 @@ bool isWide(const Triangle& triangle) {
 }
 
 /// A pose of the mesh: what it must look like, and what skins it.
-struct Pose {
+struct BuiltPose {
   std::vector<JointMatrix> joints;
   std::vector<Triangle> triangles;
   std::vector<bool> certain;  ///< by triangle
@@ -104,7 +104,7 @@ Box boxAround(const std::vector<reference::Double3>& positions) {
   return box;
 }
 
-void addExpectations(Pose& pose, OwnedMesh& mesh) {
+void addExpectations(BuiltPose& pose, OwnedMesh& mesh) {
   const reference::SkinnedMesh expected =
       *reference::skin(mesh.view(), pose.joints, Method::dualQuaternion);
   pose.box = boxAround(expected.positions);
@@ -164,7 +164,7 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   /// A plan for the pose, and the buffers that it needs; the output is the same for every pose.
-  void preparePose(Pose& pose, std::uint32_t seed) {
+  void preparePose(BuiltPose& pose, std::uint32_t seed) {
     pose.joints = randomPose(seed, jointCount, Rigidity::rigid);
     addExpectations(pose, mesh_);
     const PoseDescription palette{jointCount, 0, JointPromise::rigid};
@@ -185,7 +185,7 @@ class AccelerationStructureTest : public DeviceTest,
     makePoseBuffers(pose);
   }
 
-  void makePoseBuffers(Pose& pose) {
+  void makePoseBuffers(BuiltPose& pose) {
     const auto make = [&](BufferRole role, VkBufferUsageFlags more = 0) {
       const BufferRequirement requirement = pose.plan.buffer(role);
       return makeBuffer(requirement.size, requirement.usage | more);
@@ -205,7 +205,7 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   /// What an engine hands to its build.
-  VkAccelerationStructureGeometryKHR geometry(const Pose& pose) {
+  VkAccelerationStructureGeometryKHR geometry(const BuiltPose& pose) {
     const Result<VkAccelerationStructureGeometryTrianglesDataKHR> input =
         vulkan::buildInput(GetParam().attribute, vertexCount, address(output_));
     EXPECT_TRUE(input.ok()) << (input ? "" : input.error().message);
@@ -250,8 +250,8 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   /// Skins, then builds or refits what rays see.
-  void skinAndBuild(const Pose& pose, VkBuildAccelerationStructureModeKHR mode,
-                    AccelerationStructure& bottom, Scene& scene) {
+  void skinAndBuild(const BuiltPose& pose, VkBuildAccelerationStructureModeKHR mode,
+                    AccelerationStructure& bottom, RayScene& scene) {
     const Result<void> recorded = context().record(commandBuffer_, pose.plan, *pose.bindings);
     ASSERT_TRUE(recorded.ok()) << recorded.error().message;
     barrier(Use::dermis, Use::accelerationStructureBuild);
@@ -262,7 +262,7 @@ class AccelerationStructureTest : public DeviceTest,
   }
 
   /// Triangles that are met where the pose has them, of those that are certain.
-  std::pair<int, int> countHits(const Pose& pose, const std::vector<float>& distances) const {
+  std::pair<int, int> countHits(const BuiltPose& pose, const std::vector<float>& distances) const {
     int hits = 0, certain = 0;
     for (std::size_t triangle = 0; triangle < triangleCount; ++triangle) {
       if (!pose.certain[triangle]) continue;
@@ -287,13 +287,13 @@ TEST_P(AccelerationStructureTest, HoldsWhatWasSkinnedWhenBuiltAndWhenRefitted) {
     GTEST_SKIP() << "without VK_KHR_ray_query nothing can look into an acceleration structure";
   }
   makeMesh();
-  Pose first, second;
+  BuiltPose first, second;
   ASSERT_NO_FATAL_FAILURE(preparePose(first, 2));
   ASSERT_NO_FATAL_FAILURE(preparePose(second, 3));
   AccelerationStructure bottom(device(), *functions_,
                                VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR, geometry(first),
                                triangleCount);
-  Scene scene(device(), *functions_, bottom);
+  RayScene scene(device(), *functions_, bottom);
   RayCaster caster(device(), *functions_, 3);
 
   begin();

@@ -11,7 +11,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr std::uint32_t meshCount = 20;
+constexpr std::uint32_t outputMeshes = 20;
 
 class SystemOutputTest : public SystemTest {
  protected:
@@ -29,13 +29,13 @@ TEST_F(SystemOutputTest, TenThousandInstancesOfTwentyMeshesAreFewCommands) {
   SystemEngine engine(device(), context(), large);
   engine.begin();
   std::vector<MeshHandle> meshes;
-  for (std::uint32_t mesh = 0; mesh < meshCount; ++mesh)
+  for (std::uint32_t mesh = 0; mesh < outputMeshes; ++mesh)
     meshes.push_back(engine.addMesh(systemMesh(mesh, 40 + mesh, 4)));
   const Pose pose = systemPose(1, 4);
   std::vector<PoseHandle> palettes;
   for (std::uint32_t i = 0; i < 10'000; ++i) {
     InstanceDescription instance;
-    instance.mesh = meshes[i % meshCount];
+    instance.mesh = meshes[i % outputMeshes];
     instance.pose = palettes.emplace_back(engine.addPose(pose));
     instance.method = i % 3 == 0 ? Method::linear : Method::dualQuaternion;
     instance.layout = motionLayout();

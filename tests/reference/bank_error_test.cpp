@@ -67,7 +67,7 @@ class Genes {
   std::size_t next_ = 0;
 };
 
-struct Kind {
+struct ErrorKind {
   const char* name;
   double stretch;  ///< singular values are from 1 / (1 + stretch) to 1 + stretch
   bool mirrored;
@@ -75,22 +75,22 @@ struct Kind {
   double shift, turn, shape;
 };
 constexpr std::array kinds{
-    Kind{"turned", 0, false, 1e-4, 1e-3, 0},
-    Kind{"rigid", 0, false, 1e-4, 1e-3, 1e-4},
-    Kind{"rigid, far off", 0, false, 0.1, 0.2, 0.05},
-    Kind{"turned far", 0, false, 0.1, 0.4, 0},
-    Kind{"stretched", 1, false, 1e-4, 1e-3, 1e-4},
-    Kind{"stretched, far off", 1, false, 0.1, 0.1, 0.03},
-    Kind{"much stretched", 9, false, 1e-4, 1e-3, 1e-4},
-    Kind{"mirrored", 1, true, 1e-4, 1e-3, 1e-3},
-    Kind{"nearly flat", 9, false, 0, 1e-3, 0.01},  // some joints may be mirrors or not
+    ErrorKind{"turned", 0, false, 1e-4, 1e-3, 0},
+    ErrorKind{"rigid", 0, false, 1e-4, 1e-3, 1e-4},
+    ErrorKind{"rigid, far off", 0, false, 0.1, 0.2, 0.05},
+    ErrorKind{"turned far", 0, false, 0.1, 0.4, 0},
+    ErrorKind{"stretched", 1, false, 1e-4, 1e-3, 1e-4},
+    ErrorKind{"stretched, far off", 1, false, 0.1, 0.1, 0.03},
+    ErrorKind{"much stretched", 9, false, 1e-4, 1e-3, 1e-4},
+    ErrorKind{"mirrored", 1, true, 1e-4, 1e-3, 1e-3},
+    ErrorKind{"nearly flat", 9, false, 0, 1e-3, 0.01},  // some joints may be mirrors or not
 };
 /// One error at a time.
 constexpr std::array singleKinds{
-    Kind{"only shifted", 0, false, 0.01, 0, 0},
-    Kind{"only turned", 0, false, 0, 0.01, 0},
-    Kind{"only reshaped", 0, false, 0, 0, 0.01},
-    Kind{"stretched, only reshaped", 1, false, 0, 0, 0.01},
+    ErrorKind{"only shifted", 0, false, 0.01, 0, 0},
+    ErrorKind{"only turned", 0, false, 0, 0.01, 0},
+    ErrorKind{"only reshaped", 0, false, 0, 0, 0.01},
+    ErrorKind{"stretched, only reshaped", 1, false, 0, 0, 0.01},
 };
 
 double norm(const dmat3& matrix) {
@@ -118,7 +118,7 @@ struct Poses {
   reference::SampledPose source, bank;
 };
 
-Poses posesOf(const Kind& kind, std::uint32_t jointCount, Genes& genes) {
+Poses posesOf(const ErrorKind& kind, std::uint32_t jointCount, Genes& genes) {
   Poses poses;
   const dmat3 shared = genes.rotation(kind.turn);  // by which some joints turn together
   for (std::uint32_t joint = 0; joint < jointCount; ++joint) {
@@ -151,12 +151,12 @@ Poses posesOf(const Kind& kind, std::uint32_t jointCount, Genes& genes) {
 }
 
 /// The largest error ÷ bound.
-struct Worst {
+struct WorstShare {
   double position = 0, normal = 0, tangent = 0;
   int compared = 0, exempt = 0;
 };
 
-void compare(MeshView mesh, const Poses& poses, Method method, Worst& worst) {
+void compare(MeshView mesh, const Poses& poses, Method method, WorstShare& worst) {
   const auto source = reference::skin(mesh, poses.source, method);
   const auto bank = reference::skin(mesh, poses.bank, method);
   ASSERT_TRUE(source.ok() && bank.ok());
@@ -183,17 +183,17 @@ void compare(MeshView mesh, const Poses& poses, Method method, Worst& worst) {
   }
 }
 
-std::string nameOf(const Kind& kind, Method method) {
+std::string nameOf(const ErrorKind& kind, Method method) {
   return std::string(kind.name) + ", " + std::string(methodName(method));
 }
 
 TEST(BankError, BoundsWhatJointsAreOffBy) {
   constexpr std::uint32_t jointCount = 6, vertexCount = 40;
-  for (const Kind& kind : kinds) {
+  for (const ErrorKind& kind : kinds) {
     for (const Method method : boundedMethods) {
       const std::string name = nameOf(kind, method);
       SCOPED_TRACE(name);
-      Worst worst;
+      WorstShare worst;
       for (std::uint32_t seed = 0; seed < 200; ++seed) {
         Genes genes(seed);
         OwnedMesh mesh = randomMesh(seed, vertexCount, jointCount, 1 + seed % 6);
@@ -254,7 +254,7 @@ OwnedMesh vertexOf(std::uint32_t jointCount, Genes& genes) {
 }
 
 /// Looks for the worst case: changes it, and keeps a change that makes error ÷ bound larger.
-double searched(const Kind& kind, Method method, std::uint32_t seed) {
+double searched(const ErrorKind& kind, Method method, std::uint32_t seed) {
   constexpr std::uint32_t jointCount = 3;
   std::optional<Genes> best;
   double most = -1;
@@ -263,7 +263,7 @@ double searched(const Kind& kind, Method method, std::uint32_t seed) {
     if (i >= 100) genes.change();
     genes.rewind();
     OwnedMesh mesh = vertexOf(jointCount, genes);
-    Worst worst;
+    WorstShare worst;
     compare(mesh.view(), posesOf(kind, jointCount, genes), method, worst);
     if (::testing::Test::HasFatalFailure()) return most;
     if (worst.position <= most) continue;
@@ -274,7 +274,7 @@ double searched(const Kind& kind, Method method, std::uint32_t seed) {
 }
 
 TEST(BankError, ASearchStaysWithinTheBoundsButComesNear) {
-  for (const Kind& kind : singleKinds) {
+  for (const ErrorKind& kind : singleKinds) {
     for (const Method method : boundedMethods) {
       const std::string name = nameOf(kind, method);
       SCOPED_TRACE(name);

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -24,6 +26,11 @@ inline CommandResult dermis(std::vector<std::string> arguments,
 inline std::string outFile(const std::string& name) {
   const ::testing::TestInfo* test = ::testing::UnitTest::GetInstance()->current_test_info();
   return ::testing::TempDir() + test->test_suite_name() + "_" + test->name() + "_" + name;
+}
+
+inline std::string readText(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 /// One line "dermis: error: …"; any others are warnings and notes.

@@ -153,8 +153,8 @@ VkDeviceAddress AccelerationStructure::address() const {
   return functions_.GetAccelerationStructureDeviceAddressKHR(device_.handle(), &info);
 }
 
-Scene::Scene(samples::Device& device, const RayTracingFunctions& functions,
-             const AccelerationStructure& bottom)
+RayScene::RayScene(samples::Device& device, const RayTracingFunctions& functions,
+                   const AccelerationStructure& bottom)
     : instance_(
           makeBuffer(device, sizeof(VkAccelerationStructureInstanceKHR), vulkan::buildInputUsage)) {
   VkAccelerationStructureInstanceKHR instance{};
@@ -173,7 +173,7 @@ Scene::Scene(samples::Device& device, const RayTracingFunctions& functions,
       device, functions, VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR, geometry_, 1);
 }
 
-void Scene::build(VkCommandBuffer commandBuffer) {
+void RayScene::build(VkCommandBuffer commandBuffer) {
   top_->record(commandBuffer, VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR, geometry_);
 }
 
@@ -248,7 +248,7 @@ RayCaster::~RayCaster() {
   functions_.DestroyDescriptorSetLayout(device_.handle(), setLayout_, nullptr);
 }
 
-VkDescriptorSet RayCaster::makeSet(const Scene& scene, const Cast& cast) {
+VkDescriptorSet RayCaster::makeSet(const RayScene& scene, const Cast& cast) {
   VkDescriptorSetAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
   info.descriptorPool = pool_;
@@ -285,7 +285,7 @@ VkDescriptorSet RayCaster::makeSet(const Scene& scene, const Cast& cast) {
   return set;
 }
 
-std::size_t RayCaster::record(VkCommandBuffer commandBuffer, const Scene& scene,
+std::size_t RayCaster::record(VkCommandBuffer commandBuffer, const RayScene& scene,
                               std::span<const Ray> rays) {
   Cast cast{makeBuffer(device_, rays.size_bytes(), storage),
             makeBuffer(device_, rays.size() * sizeof(float), storage)};

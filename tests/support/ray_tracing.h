@@ -81,10 +81,10 @@ class AccelerationStructure {
 };
 
 /// A top-level structure with one bottom-level structure in it, untransformed.
-class Scene {
+class RayScene {
  public:
-  Scene(samples::Device& device, const RayTracingFunctions& functions,
-        const AccelerationStructure& bottom);
+  RayScene(samples::Device& device, const RayTracingFunctions& functions,
+           const AccelerationStructure& bottom);
   void build(VkCommandBuffer commandBuffer);
   VkAccelerationStructureKHR handle() const { return top_->handle(); }
 
@@ -110,7 +110,8 @@ class RayCaster {
   RayCaster& operator=(const RayCaster&) = delete;
 
   /// Returns the number of the cast.
-  std::size_t record(VkCommandBuffer commandBuffer, const Scene& scene, std::span<const Ray> rays);
+  std::size_t record(VkCommandBuffer commandBuffer, const RayScene& scene,
+                     std::span<const Ray> rays);
 
   /// For each ray, after the GPU is done: the distance, or -1 where the ray misses.
   std::vector<float> distances(std::size_t cast) const;
@@ -122,7 +123,7 @@ class RayCaster {
 
   void createLayouts();
   void createPipeline();
-  VkDescriptorSet makeSet(const Scene& scene, const Cast& cast);
+  VkDescriptorSet makeSet(const RayScene& scene, const Cast& cast);
 
   samples::Device& device_;
   const RayTracingFunctions& functions_;

@@ -17,7 +17,7 @@
 namespace dermis::test {
 namespace {
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 /// A good batch of three jobs; a test breaks one rule of the second job or palette.
@@ -526,7 +526,7 @@ TEST_F(PlanErrors, MorphTargetsThatStandTwice) {
 }
 
 TEST_F(PlanErrors, MorphWeightsThatAreNotFinite) {
-  for (const float bad : {nan, infinity, -infinity}) {
+  for (const float bad : {notANumber, infinity, -infinity}) {
     job().morphs = batch.keep({{0, 1.0f}, {3, bad}});
     expectInvalid({"job 1", "morph target 3", "finite"});
   }
@@ -553,7 +553,7 @@ TEST_F(PlanErrors, BoxesOfSnormPositions) {
     job().box = good;
     expectGood();
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (const float bad : {nan, infinity, -infinity}) {
+      for (const float bad : {notANumber, infinity, -infinity}) {
         job().box.min[axis] = bad;
         expectInvalid({"job 1", "box"});
         job().box = good;
@@ -569,7 +569,7 @@ TEST_F(PlanErrors, BoxesOfSnormPositions) {
     }
   }
   job().places[Stream::positions].format = VertexFormat::float16x3;
-  job().box = {{nan, nan, nan}, {0, 0, 0}};
+  job().box = {{notANumber, notANumber, notANumber}, {0, 0, 0}};
   expectGood();
 }
 

@@ -1,5 +1,7 @@
 #include "gltf_builder.h"
 
+#include <fstream>
+
 namespace dermis::test {
 
 std::string encodeBase64(std::span<const std::byte> bytes) {
@@ -65,6 +67,11 @@ std::string FileBuilder::text() const {
                         {"uri", "data:application/octet-stream;base64," + encodeBase64(binary)}}};
   }
   return file.dump();
+}
+
+std::string FileBuilder::writtenTo(const std::string& path) const {
+  std::ofstream(path, std::ios::binary) << text();
+  return path;
 }
 
 std::vector<std::byte> FileBuilder::glb() const {

@@ -60,6 +60,8 @@ class FileBuilder {
 
   /// The JSON text with the buffer as a data URI.
   std::string text() const;
+  /// Writes `text` and returns the path.
+  std::string writtenTo(const std::string& path) const;
 
   /// A GLB file with the buffer as its binary chunk.
   std::vector<std::byte> glb() const;

@@ -16,13 +16,13 @@
 namespace dermis::gltf {
 namespace {
 
-constexpr std::uint8_t notADigit = 0xff;
+constexpr std::uint8_t notHexadecimal = 0xff;
 
 std::uint8_t hexadecimalDigit(char character) {
   if (character >= '0' && character <= '9') return static_cast<std::uint8_t>(character - '0');
   if (character >= 'a' && character <= 'f') return static_cast<std::uint8_t>(character - 'a' + 10);
   if (character >= 'A' && character <= 'F') return static_cast<std::uint8_t>(character - 'A' + 10);
-  return notADigit;
+  return notHexadecimal;
 }
 
 // RFC 3986: a scheme is a letter followed by letters, digits, '+', '-' or '.', up to a colon.
@@ -199,9 +199,9 @@ std::string decodePercent(std::string_view text, const std::string& where) {
       decoded.push_back(text[i]);
       continue;
     }
-    const std::uint8_t high = i + 2 < text.size() ? hexadecimalDigit(text[i + 1]) : notADigit;
-    const std::uint8_t low = i + 2 < text.size() ? hexadecimalDigit(text[i + 2]) : notADigit;
-    if (high == notADigit || low == notADigit) {
+    const std::uint8_t high = i + 2 < text.size() ? hexadecimalDigit(text[i + 1]) : notHexadecimal;
+    const std::uint8_t low = i + 2 < text.size() ? hexadecimalDigit(text[i + 2]) : notHexadecimal;
+    if (high == notHexadecimal || low == notHexadecimal) {
       failInvalid(where, ": character ", i, " of its uri is a '%' without two digits");
     }
     decoded.push_back(static_cast<char>(high << 4 | low));

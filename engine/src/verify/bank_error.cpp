@@ -42,7 +42,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include <glm/geometric.hpp>
@@ -57,8 +56,6 @@ using glm::dmat3;
 using glm::dmat4;
 using glm::dvec3;
 using glm::dvec4;
-
-constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 /// Of a joint that kernels treat as rigid: half of the largest deviation that they accept
 /// (docs/accuracy.md, "The shortcut").

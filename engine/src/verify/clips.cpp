@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -42,7 +41,6 @@ using glm::dvec4;
 constexpr double u = 0x1p-24;          // half the distance from 1 to the next number of float32
 constexpr double denormal = 0x1p-126;  ///< a GPU may flush smaller numbers to 0
 constexpr double mostSize = 0x1p126;   ///< larger numbers may overflow
-constexpr double noBound = std::numeric_limits<double>::infinity();
 /// Of a vector or a matrix that is computed from a few others: 64 numbers are flushed.
 constexpr double flushedMatrix = 64 * denormal;
 /// Of a vector between keys: its three steps, which are multiplied by less than 2^21, and others.
@@ -386,8 +384,8 @@ double largestOf(const dvec3& v) {
 /// The numbers of `local` may overflow: then no error is too large.
 void checkRange(const Local& local, LocalError& error) {
   if (!(glm::length(local.translation) + error.translation <= mostSize))
-    error.translation = noBound;
-  if (!(largestOf(local.scale) + error.scale <= mostSize)) error.scale = noBound;
+    error.translation = unbounded;
+  if (!(largestOf(local.scale) + error.scale <= mostSize)) error.scale = unbounded;
 }
 
 /// The angle by which a sum of quaternions turns if its parts are off by `angle` together.
@@ -461,7 +459,7 @@ void add(const Skeleton& skeleton, std::uint32_t node, const Layer& layer,
                              denormal * largestOf(difference.scale - 1.0) + flushedMatrix;
   error.scale = error.scale * largestOf(growth) +
                 (largestOf(local.scale) + error.scale) * growthError + flushedMatrix;
-  if (!(largestOf(growth) <= mostSize)) error.scale = noBound;
+  if (!(largestOf(growth) <= mostSize)) error.scale = unbounded;
   local.scale *= growth;
   checkRange(local, error);
 }
@@ -569,8 +567,8 @@ std::array<double, 3> boundOf(std::span<const PosedNode> nodes,
   const dvec3 t(inverseBind[3]);
   const PosedNode& last = nodes[joint];
   const double size = last.product * (values[0] + glm::length(t)) + last.span;
-  if (last.mayOverflow || !(size <= mostSize)) return {noBound, noBound, noBound};
-  if (values[2] == 0) return {mostSize, noBound, noBound};
+  if (last.mayOverflow || !(size <= mostSize)) return {unbounded, unbounded, unbounded};
+  if (values[2] == 0) return {mostSize, unbounded, unbounded};
   const double bind = glm::length(glm::inverse(dmat3(inverseBind)) * t);
   const double flushedJoint = flushedMatrix * std::max(last.above, last.stretch);
   double atJoint = 16 * u * (last.product * (values[0] * bind + glm::length(t)) + last.span) +
@@ -744,13 +742,13 @@ Result<SampledWeights> sampleWeights(const Skeleton& skeleton, std::span<const C
       const double base = layer.base ? at(*layer.base, layer.baseTime) : rest;
       const double factor = layer.factor(node), size = std::abs(factor);
       const double difference = at(layer.clip, layer.time) - base;
-      if (!(std::abs(weight) + bound <= mostSize)) bound = noBound;
+      if (!(std::abs(weight) + bound <= mostSize)) bound = unbounded;
       weight += factor * difference;
       bound += size * (clipError + flushedVector) +
                4 * u * (std::abs(weight) + size * std::abs(difference)) +
                denormal * std::abs(difference) + flushedMatrix;
     }
-    if (!(std::abs(weight) + bound <= mostSize)) bound = noBound;
+    if (!(std::abs(weight) + bound <= mostSize)) bound = unbounded;
     result.weights.push_back(weight);
     if (bank != nullptr) result.bounds.push_back(bound);
   }

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <string>
 #include <utility>
@@ -38,7 +37,6 @@ constexpr std::uint32_t noParent = 0xffffffffu;
 constexpr double rounded = 1.001 * floatRounding;
 constexpr double leastNormal = 0x1p-126;  ///< a GPU may flush smaller numbers to 0
 constexpr double overflowing = 0x1p126;   ///< larger numbers may overflow
-constexpr double unbounded = std::numeric_limits<double>::infinity();
 /// Of a computation in double precision that packing does, too, relative to its largest number.
 constexpr double doubleRounding = 0x1p-49;
 

@@ -13,8 +13,8 @@ using glm::dvec3;
 using glm::dvec4;
 
 dvec4 multiply(const dvec4& a, const dvec4& b) {
-  const dvec3 u(a), v(b);
-  return dvec4(a.w * v + b.w * u + glm::cross(u, v), a.w * b.w - glm::dot(u, v));
+  const dvec3 x(a), y(b);
+  return dvec4(a.w * y + b.w * x + glm::cross(x, y), a.w * b.w - glm::dot(x, y));
 }
 
 dvec4 conjugate(const dvec4& q) {

@@ -2,11 +2,16 @@
 // engine may change their layout by a macro.
 #pragma once
 
+#include <limits>
+
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
 namespace dermis::reference {
+
+/// As an error bound: the error may be anything.
+inline constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 /// real + ε dual, each x y z w. Also represents a logarithm, which has no scalar parts.
 struct Rigid {

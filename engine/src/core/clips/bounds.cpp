@@ -33,11 +33,11 @@ using math::Vec4;
 constexpr double pi = std::numbers::pi;
 constexpr double u = 0x1p-24;
 
-Vec4 normalized(const Vec4& q) {
+Vec4 unitOf(const Vec4& q) {
   return math::dot(q, q) > 0 ? math::normalize(q) : Vec4{0, 0, 0, 1};
 }
 
-Vec4 product(const Vec4& a, const Vec4& b) {
+Vec4 quaternionProduct(const Vec4& a, const Vec4& b) {
   return {
       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
@@ -54,7 +54,7 @@ double arcBetween(const Vec4& a, const Vec4& b) {
   return 2 * std::asin(std::min(1.0, 0.5 * std::sqrt(math::dot(d, d))));
 }
 
-AffineMap multiply(const AffineMap& a, const AffineMap& b) {
+AffineMap composition(const AffineMap& a, const AffineMap& b) {
   return {a.linear * b.linear, a.linear * b.offset + a.offset};
 }
 
@@ -80,8 +80,8 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
   const auto put = [&](Vec4 v) {
     if (!std::isfinite(math::dot(v, v))) v = {infinity, infinity, infinity, infinity};
     if (isRotation) {
-      v = normalized(v);
-      values.push_back(isAdditive ? normalized(product(rest, v)) : v);
+      v = unitOf(v);
+      values.push_back(isAdditive ? unitOf(quaternionProduct(rest, v)) : v);
     } else if (isAdditive) {
       values.push_back(path == ChannelPath::scale
                            ? Vec4{rest.x * v.x, rest.y * v.y, rest.z * v.z, 0}
@@ -93,7 +93,7 @@ void gather(const ClipBank& bank, const BankClip& clip, std::size_t node, Channe
   const std::uint32_t word = bank.words[clip.tracks + 3 * node + static_cast<std::size_t>(path)];
   const auto kind = static_cast<TrackKind>(word >> 30);
   if (kind == TrackKind::rest) {
-    values.push_back(isRotation ? normalized(rest) : rest);
+    values.push_back(isRotation ? unitOf(rest) : rest);
     return;
   }
   if (kind == TrackKind::constant) {
@@ -175,7 +175,7 @@ void boundRotation(const std::vector<Vec4>& values, LocalRegion& region) {
         values, {}, [&from](const Vec4& value) { return arcBetween(from, value); });
   };
   const Vec4 a = farthestFrom(values[0]), b = farthestFrom(a);
-  region.rotation = normalized(mix(a, 1, b, math::dot(a, b) < 0 ? -1 : 1));
+  region.rotation = unitOf(mix(a, 1, b, math::dot(a, b) < 0 ? -1 : 1));
   const double arc = arcBetween(region.rotation, farthestFrom(region.rotation));
   // Below 45° all are in one hemisphere, whichever is the first, and so are their means. The
   // rotation turns by twice the arc.
@@ -240,7 +240,7 @@ struct Chain {
 Chain below(const Chain& above, const LocalRegion& local) {
   Chain chain;
   const double high = above.stretch.high, distance = math::length(local.center.offset);
-  chain.map = multiply(above.map, local.center);
+  chain.map = composition(above.map, local.center);
   chain.stretch = above.stretch * local.stretch;
   chain.shift = above.shift + above.turn * distance + high * local.shift;
   chain.turn = above.turn * local.stretch.high + high * local.spread;
@@ -248,7 +248,7 @@ Chain below(const Chain& above, const LocalRegion& local) {
       above.noiseShift + above.noiseTurn * (distance + local.shift) +
       32 * u * (math::length(above.map.offset) + above.shift + high * (local.size + local.shift));
   chain.noiseTurn = above.noiseTurn * local.stretch.high + 32 * u * chain.stretch.high;
-  chain.rotation = product(above.rotation, local.rotation);
+  chain.rotation = quaternionProduct(above.rotation, local.rotation);
   chain.angle = above.angle + local.angle;
   // Any matrix of this size.
   if (chain.turn >= chain.stretch.high) {
@@ -287,7 +287,7 @@ class ClipRegions final : public bounds::JointRegions {
   /// All means of the rest pose and of poses of clips.
   void setBlends(std::span<const std::uint32_t> clips) {
     set([&](std::size_t node, ChannelPath path, const Vec4& rest, std::vector<Vec4>& values) {
-      values.push_back(path == ChannelPath::rotation ? normalized(rest) : rest);
+      values.push_back(path == ChannelPath::rotation ? unitOf(rest) : rest);
       for (const std::uint32_t number : clips) {
         const BankClip clip = bank_.clip(number);
         gather(bank_, clip, node, path, 0, clip.duration, rest, values);
@@ -306,7 +306,7 @@ class ClipRegions final : public bounds::JointRegions {
       error += chain.shift + chain.turn * reach;
       noise += whole.noiseShift + whole.noiseTurn * reach + bindNoise(whole, joint) +
                joints[joint].slack * bounds::reachOf(bounds::rangeOf(extent));
-      return multiply(chain.map, binds_[joint]);
+      return composition(chain.map, binds_[joint]);
     };
     const AffineMap between = place(first) - place(second);
     const double distance = bounds::reachOf(bounds::imageOf(between, extent));
@@ -380,12 +380,12 @@ class ClipRegions final : public bounds::JointRegions {
   void putBelowFixed(std::size_t matrix, LocalRegion& local) const {
     const AffineMap fixed = affineAt(bank_, matrix);
     const Stretch stretch = stretchOf(bank_.at<Affine<float>>(matrix));
-    local.center = multiply(fixed, local.center);
+    local.center = composition(fixed, local.center);
     local.shift *= stretch.high;
     local.spread *= stretch.high;
     local.size = local.size * stretch.high + math::length(fixed.offset);
     local.stretch = stretch * local.stretch;
-    local.rotation = product(rotationOf(fixed, stretch), local.rotation);
+    local.rotation = quaternionProduct(rotationOf(fixed, stretch), local.rotation);
     local.angle += similarityError(stretch);
   }
 
@@ -401,7 +401,7 @@ class ClipRegions final : public bounds::JointRegions {
     region.most = stretch.high;
     if (nodeOf(joint) == noNode) return;
     const Chain& chain = chains_[nodeOf(joint)];
-    region.map = multiply(chain.map, bind);
+    region.map = composition(chain.map, bind);
     region.shift = chain.shift + chain.noiseShift + bindNoise(chain, joint);
     region.turn = chain.turn + chain.noiseTurn;
     region.slack = 32 * u * chain.stretch.high * stretch.high;
@@ -409,7 +409,7 @@ class ClipRegions final : public bounds::JointRegions {
     const Stretch all = chain.stretch * stretch;
     region.most = all.high + chain.noiseTurn * stretch.high + region.slack;
     region.least = std::max(0.0, all.low - (region.most - all.high));
-    region.rotation = product(chain.rotation, region.rotation);
+    region.rotation = quaternionProduct(chain.rotation, region.rotation);
     region.angle += chain.angle;
   }
 
