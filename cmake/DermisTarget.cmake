@@ -137,11 +137,17 @@ function(dermis_without_exceptions target)
   target_compile_options(${target} PRIVATE $<IF:$<BOOL:${MSVC}>,/GR-,-fno-exceptions;-fno-rtti>)
 endfunction()
 
-# dermis_precompile(TARGET HEADERS...): precompiles headers of the standard library and these in Dermis' own builds, about a quarter
-# of the compile time. Every file still includes what it uses: the nightly part `clang` builds without. Like an engine that does so,
-# CI joins sources (CMAKE_UNITY_BUILD), which halves it.
+# Dermis' own builds precompile headers, which takes a quarter of their compile time away. CI joins sources instead
+# (CMAKE_UNITY_BUILD), as engines do: that takes away half, and precompiled headers then cost more than they bring. Every file still
+# includes what it uses: the nightly part `clang` builds with neither.
+set(DERMIS_PRECOMPILES ${PROJECT_IS_TOP_LEVEL})
+if(CMAKE_UNITY_BUILD)
+  set(DERMIS_PRECOMPILES OFF)
+endif()
+
+# dermis_precompile(TARGET HEADERS...): precompiles headers of the standard library and these.
 function(dermis_precompile target)
-  if(PROJECT_IS_TOP_LEVEL)
+  if(DERMIS_PRECOMPILES)
     target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <cstring> <functional> <limits> <map> <memory> <optional>
       <span> <string> <string_view> <utility> <vector> ${ARGN})
   endif()
@@ -149,7 +155,7 @@ endfunction()
 
 # dermis_precompile_as(TARGET OTHER): uses the precompiled headers of OTHER, whose compile options must be the same.
 function(dermis_precompile_as target other)
-  if(PROJECT_IS_TOP_LEVEL)
+  if(DERMIS_PRECOMPILES)
     target_precompile_headers(${target} REUSE_FROM ${other})
   endif()
 endfunction()
