@@ -261,6 +261,7 @@ struct Executor {
   std::map<std::uint32_t, Rhi::Buffer> buffers;
   std::map<PipelineId, VkPipeline> pipelines;
   std::vector<Rhi::Buffer> staging;  ///< of the frame
+  Rhi::Buffer tables = rhi.createBuffer(1 << 16, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);  ///< the same
 
   static Result<void*> createBuffer(void* user, const SceneBuffer& wanted) {
     Executor& self = *static_cast<Executor*>(user);
@@ -302,9 +303,12 @@ void Executor::execute(std::span<const Command> commands) {
               }
             },
             [&](const UploadCommand& upload) {
-              const Rhi::Buffer& from = staging.emplace_back(
-                  rhi.createBuffer(upload.to.size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
-              std::ranges::copy(upload.bytes, from.mapped);
+              Rhi::Buffer from = tables;
+              if (upload.bytes.data() != tables.mapped) {  // else they are there already
+                from = rhi.createBuffer(upload.to.size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT);
+                staging.push_back(from);
+                std::ranges::copy(upload.bytes, from.mapped);
+              }
               const VkBufferCopy region{0, upload.to.offset, upload.to.size};
               vkCmdCopyBuffer(to, from.buffer, buffer(upload.to.buffer), 1, &region);
             },
@@ -406,7 +410,8 @@ int main() {
     for (std::uint32_t number = 0; number < figureCount; ++number)
       std::ranges::copy(poseOf(number, frame), must(scene.writePose(poses[number])).begin());
     executor.rhi.begin();
-    executor.execute(must(commands.plan()));
+    const Rhi::Buffer& tables = executor.tables;
+    executor.execute(must(commands.plan({tables.mapped, tables.size})));
     must(commands.commit());
     // An engine records the barrier to its draws here, and draws.
     executor.rhi.submit();

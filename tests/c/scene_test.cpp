@@ -623,7 +623,7 @@ TEST(CCommandsTest, AreThoseOfCpp) {
     expectError(dermis_mark_morphs_written(scene, &instances[0], 1, &error), "morph weights");
     const dermis_command* list = nullptr;
     std::uint32_t count = 0;
-    expectOk(dermis_commands_plan(commands, &list, &count, &error));
+    expectOk(dermis_commands_plan(commands, nullptr, 0, &list, &count, &error));
     expectCommands({list, count}, must(same.plan()));
     std::uint32_t output = 0;
     expectOk(dermis_commands_commit(commands, &output, &error));
@@ -751,8 +751,13 @@ TEST(CCommandsTest, RigsAreThoseOfCpp) {
   must(same.scene().markWritten({&samePoses[1], 1}));
   const dermis_command* list = nullptr;
   std::uint32_t count = 0;
-  expectOk(dermis_commands_plan(commands, &list, &count, &error));
+  std::vector<std::byte> tables(1 << 16);
+  expectOk(dermis_commands_plan(commands, tables.data(), tables.size(), &list, &count, &error));
   expectCommands({list, count}, must(same.plan()));
+  const auto upload =
+      std::ranges::find(std::span(list, count), DERMIS_UPLOAD, &dermis_command::kind);
+  ASSERT_NE(upload, std::span(list, count).end());
+  EXPECT_EQ(upload->as.upload.bytes, tables.data());
   EXPECT_EQ(buffers.buffers, sameBuffers.buffers);
 
   // The pipelines of such instances, with and without a scene.

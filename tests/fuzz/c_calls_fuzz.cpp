@@ -4,7 +4,9 @@
 
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <map>
+#include <vector>
 
 #include "c_calls_import.h"
 
@@ -252,7 +254,7 @@ class Caller : Imports {
     desc.wants_bounds = oneOf(4);
     desc.update_interval = number(0, 3);
     desc.culled_on_gpu = engine.commands != nullptr && oneOf(4);
-    desc.interpolates = desc.layout.motion != 0 && oneOf(2);
+    desc.interpolates = desc.layout.has_motion != 0 && oneOf(2);
     return desc;
   }
   void addInstance() {
@@ -490,8 +492,10 @@ class Caller : Imports {
     const bool mustPlan = engine.frame > 0 && !engine.isExecuted && engine.hasRoom();
     const Outputs<const dermis_command*> list;
     const Outputs<std::uint32_t> count, output;
-    const auto code = call({&list, &count}, dermis_commands_plan, engine.commands.get(),
-                           list.as<const dermis_command*>(), count.get());
+    std::vector<std::byte> tables(seldom() ? 64 : 1 << 16);
+    const auto code =
+        call({&list, &count}, dermis_commands_plan, engine.commands.get(), tables.data(),
+             tables.size(), list.as<const dermis_command*>(), count.get());
     if (mustPlan) expect(code == DERMIS_OK);
     if (engine.frame == 0) expect(code == DERMIS_INVALID_ARGUMENT);
     for (std::uint32_t i = 0; code == DERMIS_OK && i < count[0]; ++i)

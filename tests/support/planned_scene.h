@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -53,7 +54,29 @@ class PlannedScene {
   Result<MeshHandle> addMesh(const MeshInfo& info) {
     return SceneAccess::changed(*scene_).addMesh(info, nullptr);
   }
-  Result<void> plan() { return books().plan(planned); }
+  /// Plans twice, into memory with other contents: the tables are the same. With `lentBytes` 0, or
+  /// where they are too few, the tables are elsewhere.
+  Result<void> plan() {
+    std::vector<std::byte> tables;
+    const std::uint32_t version = books().nextVersion_;  // each plan gives new ones
+    for (const std::byte before : {std::byte{0xff}, std::byte{0x35}}) {
+      books().nextVersion_ = version;
+      lent_.assign(lentBytes + 4, before);
+      if (Result<void> good = books().plan(planned, std::span(lent_).first(lentBytes)); !good)
+        return good;
+      const std::span<const std::byte> now = PlanData::of(planned).tables.bytes();
+      if (before != std::byte{0xff}) {
+        EXPECT_TRUE(std::ranges::equal(now, tables)) << "words of the tables were not written";
+      }
+      tables.assign(now.begin(), now.end());
+      if (!now.empty()) {
+        EXPECT_EQ(now.data() == lent_.data(), now.size() <= lentBytes);
+      }
+      EXPECT_TRUE(std::ranges::all_of(std::span(lent_).subspan(lentBytes),
+                                      [&](std::byte byte) { return byte == before; }));
+    }
+    return {};
+  }
   Result<void> commit() { return books().commit(); }
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
     return books().readBack(frame, bytes);
@@ -108,9 +131,12 @@ class PlannedScene {
   /// Refuses a buffer, if it returns an error.
   std::function<Result<void>(const SceneBuffer&)> refuses;
   bool mapsPoses = true;
+  std::size_t lentBytes = 4096;  ///< for tables
   Plan planned;
 
  private:
+  std::vector<std::byte> lent_;
+
   Result<void*> create(const SceneBuffer& wanted) {
     asked.push_back(wanted);
     if (refuses) {

@@ -144,6 +144,25 @@ TEST(Scene, AFrameUploadsConvertsSkinsAndReadsBack) {
           "compute write before copy read", "results to read-back", "copy write before host"}));
 }
 
+// What every plan of `PlannedScene` is checked for, where the tables do not fit.
+TEST(Scene, TablesAreElsewhereIfTheLentMemoryIsTooSmall) {
+  OneInstance one;
+  one.plan(1, 0);
+  const auto tables = [&] {
+    const auto* upload = std::get_if<UploadCommand>(&one.planned.commands()[1]);
+    return std::vector<std::byte>(upload->bytes.begin(), upload->bytes.end());
+  };
+  const std::vector<std::byte> fitting = tables();
+  for (const std::size_t bytes :
+       {std::size_t{0}, std::size_t{1}, fitting.size() - 1, fitting.size()}) {
+    one.owner.lentBytes = bytes;
+    must(one.owner.plan());
+    EXPECT_EQ(tables(), fitting);
+  }
+  one.owner.lentBytes = 1;
+  for (int i = 0; i < 100; ++i) must(one.owner.plan());  // memory of their own does not grow
+}
+
 /// Every variant that the plans of one instance use, with and without active morph targets.
 std::set<PipelineId> pipelinesOf(PlannedScene& owner, InstanceHandle instance,
                                  std::uint32_t targets) {

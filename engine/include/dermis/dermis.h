@@ -910,9 +910,14 @@ DERMIS_C_API dermis_scene* dermis_commands_scene(dermis_commands* commands);
 // own uses of the output and `DERMIS_USE_DERMIS`, before and after; and after it, for a read-back
 // buffer that it copies further, that from COPY_WRITE to COPY_READ. They are
 // valid until the next call of a function of the scene or of this object.
-DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands,
-                                              const dermis_command** list, uint32_t* count,
-                                              dermis_error* error);
+//
+// `tables`, `table_bytes`: memory for the bytes of the first DERMIS_UPLOAD, for example of a mapped
+// staging buffer that no frame in flight uses, so that nobody needs to copy them; may be null and
+// 0. They begin at its beginning; where it is too small, they are elsewhere. It is written and not
+// read, but when it turns out to be too small.
+DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands, void* tables,
+                                              size_t table_bytes, const dermis_command** list,
+                                              uint32_t* count, dermis_error* error);
 // States that the commands of the last plan have been recorded. `output_buffer` gets the number of
 // the output buffer, and may be null.
 DERMIS_C_API dermis_code dermis_commands_commit(dermis_commands* commands, uint32_t* output_buffer,

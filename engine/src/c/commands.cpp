@@ -190,13 +190,15 @@ dermis_scene* dermis_commands_scene(dermis_commands* commands) {
   return commands == nullptr ? nullptr : &commands->scene;
 }
 
-dermis_code dermis_commands_plan(dermis_commands* commands, const dermis_command** list,
-                                 uint32_t* count, dermis_error* error) {
+dermis_code dermis_commands_plan(dermis_commands* commands, void* tables, size_t table_bytes,
+                                 const dermis_command** list, uint32_t* count,
+                                 dermis_error* error) {
   return guarded(error, [&] {
     dermis_commands& lender = required(commands, "commands");
     const dermis_command*& first = required(list, "list");
     std::uint32_t& size = required(count, "count");
-    lender.list.fill(must(lender.commands->plan()));
+    const std::span<std::byte> room = array(static_cast<std::byte*>(tables), table_bytes, "tables");
+    lender.list.fill(must(lender.commands->plan(room)));
     first = lender.list.commands.data();
     size = static_cast<std::uint32_t>(lender.list.commands.size());
   });

@@ -137,7 +137,8 @@ struct BindingsState {
   Result<void> checkOneBuffer(const Plan& plan) const;
 };
 
-/// Where the bytes of uploads are put for the GPU to copy them, one after the other.
+/// Where the bytes of uploads are put for the GPU to copy them, one after the other. Those of the
+/// first may be there already.
 struct Staging {
   VkBuffer buffer = VK_NULL_HANDLE;
   std::span<std::byte> bytes;

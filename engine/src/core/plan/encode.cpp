@@ -7,7 +7,6 @@
 #include <cstring>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 
 namespace dermis {
@@ -20,13 +19,6 @@ constexpr std::uint64_t maxWorkgroups = std::uint64_t{1} << 31;
 std::uint64_t divideUp(std::uint64_t value, std::uint64_t divisor) {
   return (value + divisor - 1) / divisor;
 }
-
-std::uint32_t wordsOf(const std::vector<std::uint32_t>& tables) {
-  return static_cast<std::uint32_t>(tables.size());
-}
-
-using abi::alignToUnit;
-using abi::store;
 
 void setBox(abi::ExtensionRecord& extension, const Box& box) {
   const BoxScale scale = boxScale(box);
@@ -44,7 +36,7 @@ void PlanData::clear() {
   commands.clear();
   bindings.clear();
   pipelines.clear();
-  tables.clear();
+  tables.begin({});
   for (std::vector<std::uint32_t>& units : paletteUnits) units.clear();
   results.clear();
   sizes = {};
@@ -53,11 +45,13 @@ void PlanData::clear() {
 }
 
 Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
-                             const PlanSizes& sizes, PlanData& plan, std::uint32_t record) {
+                             const PlanSizes& sizes, PlanData& plan, std::uint32_t record,
+                             std::span<std::byte> lent) {
   plan_ = &plan;
   work_ = &work;
   tuning_ = tuning;
   plan.clear();
+  plan.tables.begin(lent);
   plan.limits = limits;
   plan.sizes = sizes;
   dispatches_.clear();
@@ -76,8 +70,8 @@ Result<void> Encoder::encode(const Work& work, const DeviceLimits& limits, const
     appendCulledDispatches();
     if (Result<void> good = addVisibilityDispatches(record); !good) return good;
   }
-  if (plan.tables.size() * 4 > limits.maxStorageBufferRange)
-    return tooLargeForRange("tables", plan.tables.size() * 4, limits);
+  if (const std::uint64_t size = plan.tables.bytes().size(); size > limits.maxStorageBufferRange)
+    return tooLargeForRange("tables", size, limits);
   plan.instanceCount = static_cast<std::uint32_t>(work.instances.size());
   // Commands point into the list, so it must not move.
   plan.bindings.reserve(
@@ -92,7 +86,7 @@ template <typename Push>
 void setConstants(DispatchCommand& dispatch, const Push& push) {
   static_assert(sizeof(Push) <= sizeof(dispatch.constants));
   dispatch.constantCount = sizeof(Push) / 4;
-  store(dispatch.constants, 0, push);
+  abi::store(dispatch.constants, 0, push);
 }
 
 }  // namespace
@@ -127,29 +121,28 @@ Result<void> Encoder::addFigureDispatches() {
   if (work_->banks.empty()) return {};
   std::size_t bands = 0, count = 0;
   for (const Work::Bank& bank : work_->banks) bands = std::max(bands, bank.clips->bandEnds.size());
-  std::vector<std::uint32_t>& tables = plan_->tables;  // they begin with these
+  TableWords& tables = plan_->tables;  // they begin with these
   const std::size_t bankWords = abi::BANK_WORDS + bands * abi::BAND_WORDS;
-  tables.resize(work_->banks.size() * bankWords);
+  tables.appendZeros(work_->banks.size() * bankWords);  // banks with fewer bands
   for (std::size_t i = 0; i < work_->banks.size(); ++i) {
     const Work::Bank& bank = work_->banks[i];
     const DeviceClips& clips = *bank.clips;
-    store(tables, i * bankWords, abi::BankRecord{bank.words, clips.nodeCount, 0, 0});
+    tables.store(i * bankWords, abi::BankRecord{bank.words, clips.nodeCount, 0, 0});
     std::uint32_t begin = 0;
     for (std::size_t band = 0; band < clips.bandEnds.size(); ++band) {
-      store(tables, i * bankWords + abi::BANK_WORDS + band * abi::BAND_WORDS,
-            abi::BandRecord{bank.deviceWords + begin * abi::STEP_WORDS,
-                            clips.bandEnds[band] - begin, 0, 0});
+      tables.store(i * bankWords + abi::BANK_WORDS + band * abi::BAND_WORDS,
+                   abi::BandRecord{bank.deviceWords + begin * abi::STEP_WORDS,
+                                   clips.bandEnds[band] - begin, 0, 0});
       begin = clips.bandEnds[band];
     }
   }
-  const std::uint32_t figures = wordsOf(tables);
+  const std::uint32_t figures = tables.size();
   figureWords_.clear();
   for (const std::vector<abi::FigureRecord>& records : work_->figures) {
-    figureWords_.push_back(wordsOf(tables));
+    figureWords_.push_back(tables.size());
     for (abi::FigureRecord record : records) {
       record.bank *= static_cast<std::uint32_t>(bankWords);
-      tables.resize(tables.size() + abi::FIGURE_WORDS);
-      store(tables, tables.size() - abi::FIGURE_WORDS, record);
+      tables.append(record);
     }
     count += records.size();
   }
@@ -180,9 +173,9 @@ Result<void> Encoder::addFigureDispatches() {
 /// One invocation per pose, a dispatch for each rig and each pair of buffers. They wait for each
 /// other, since each reads and writes driven joints.
 Result<void> Encoder::addRigDispatches() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
+  TableWords& tables = plan_->tables;
   for (const Work::Rig& rig : work_->rigs) {
-    const std::uint32_t first = wordsOf(tables);
+    const std::uint32_t first = tables.size();
     for (std::size_t i = 0; i < rig.poses.size(); ++i) {
       abi::RigRecord record = rig.poses[i];
       record.figure = abi::RIG_NO_FIGURE;
@@ -190,8 +183,7 @@ Result<void> Encoder::addRigDispatches() {
         const auto& [buffer, place] = work_->figurePlaces[rig.figures[i]];
         record.figure = figureWords_[buffer] + place * abi::FIGURE_WORDS;
       }
-      tables.resize(tables.size() + abi::RIG_WORDS);
-      store(tables, tables.size() - abi::RIG_WORDS, record);
+      tables.append(record);
     }
     const auto count = static_cast<std::uint32_t>(rig.poses.size());
     if (Result<void> good = addDispatch(poseVariant(Kernel::rig, plan_->limits, tuning_),
@@ -214,7 +206,7 @@ Result<void> Encoder::addPaletteDispatches() {
     const Work::Poses& poses = work_->poses[index];
     for (std::uint32_t rest = poses.filled; rest != 0; rest &= rest - 1) {
       const auto kind = static_cast<std::uint32_t>(std::countr_zero(rest));
-      paletteWords_[index * paletteKindCount + kind] = wordsOf(plan_->tables);
+      paletteWords_[index * paletteKindCount + kind] = plan_->tables.size();
       if (Result<void> good = addPaletteDispatch(poses, kind); !good) return good;
     }
   }
@@ -223,16 +215,9 @@ Result<void> Encoder::addPaletteDispatches() {
 
 /// One workgroup per palette.
 Result<void> Encoder::addPaletteDispatch(const Work::Poses& poses, std::uint32_t kind) {
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  const auto append = [&tables](const auto& records) {
-    const std::uint32_t first = wordsOf(tables);
-    const std::size_t size = std::span(records).size_bytes();
-    tables.resize(first + size / 4);
-    if (size != 0) std::memcpy(&tables[first], records.data(), size);
-    return first;
-  };
   const auto& [records, drivenRecords] = poses.lists[kind];
-  const std::uint32_t first = append(records), driven = append(drivenRecords);
+  const std::uint32_t first = plan_->tables.appendAll(records);
+  const std::uint32_t driven = plan_->tables.appendAll(drivenRecords);
   const Variant variant = paletteVariant(static_cast<PaletteForm>(kind / jointPromiseCount),
                                          static_cast<JointPromise>(kind % jointPromiseCount),
                                          poses.drivenBuffer != notUsed, plan_->limits, tuning_);
@@ -250,10 +235,8 @@ Result<void> Encoder::addPaletteDispatch(const Work::Poses& poses, std::uint32_t
 /// One invocation per result.
 Result<void> Encoder::addClearDispatch() {
   if (work_->clearedResults.empty()) return {};
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::uint32_t first = wordsOf(tables);
-  tables.insert(tables.end(), work_->clearedResults.begin(), work_->clearedResults.end());
-  alignToUnit(tables);
+  const std::uint32_t first = plan_->tables.appendAll(work_->clearedResults);
+  plan_->tables.alignToUnit();
   return addDispatch(
       variantOf(Kernel::clear, plan_->limits, tuning_),
       divideUp(work_->clearedResults.size(), tuning_.workgroupSize),
@@ -305,11 +288,11 @@ std::uint32_t Encoder::instancesPerInvocation(std::span<const std::uint32_t> gro
 
 /// A record for each group, and a dispatch for groups of one variant and output range.
 Result<void> Encoder::addDispatches() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::uint32_t groupRecords = wordsOf(tables);
-  tables.resize(groupRecords + work_->groups.size() * abi::GROUP_WORDS);
-  const std::uint32_t instanceRecords = wordsOf(tables);
+  TableWords& tables = plan_->tables;
+  const std::uint32_t groupRecords = tables.grow(work_->groups.size() * abi::GROUP_WORDS);
+  const std::uint32_t instanceRecords = tables.size();
   const bool palettesRun = !dispatches_.empty();
+  instancesEach_.clear();
 
   const std::span<const std::uint32_t> order = work_->order;
   for (std::size_t begin = 0; begin < order.size();) {
@@ -338,7 +321,8 @@ Result<void> Encoder::addDispatches() {
       record.previousStride = group.key.strides[3];
       // About the same for all, so that workgroups take about the same time.
       record.instancesEach = static_cast<std::uint32_t>(divideUp(group.instances, shares));
-      store(tables, groupRecords + index * abi::GROUP_WORDS, record);
+      instancesEach_.push_back(record.instancesEach);
+      tables.store(groupRecords + index * abi::GROUP_WORDS, record);
     }
     const Group& group = work_->groups[order[begin]];
     const Variant& variant = group.variant;
@@ -361,36 +345,50 @@ Result<void> Encoder::addDispatches() {
 }
 
 std::uint32_t Encoder::appendExtension(const InstanceExtras& extras) {
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  alignToUnit(tables);
-  const std::uint32_t place = wordsOf(tables);
-  tables.resize(tables.size() + abi::EXTENSION_WORDS);
+  TableWords& tables = plan_->tables;
+  tables.alignToUnit();
+  const std::uint32_t place = tables.grow(abi::EXTENSION_WORDS);
   abi::ExtensionRecord extension{};
-  extension.morphs = wordsOf(tables);  // needs no alignment
+  extension.morphs = tables.appendAll(extras.morphs);  // needs no alignment
   extension.morphCount = static_cast<std::uint32_t>(extras.morphs.size());
-  for (const MorphWeight& morph : extras.morphs)
-    tables.insert(tables.end(), {morph.target, std::bit_cast<std::uint32_t>(morph.weight)});
-  tables.resize(tables.size() + (std::size_t{extras.writtenMorphs} + extras.drivenMorphs) *
-                                    abi::ACTIVE_MORPH_WORDS);
+  tables.appendZeros((std::size_t{extras.writtenMorphs} + extras.drivenMorphs) *
+                     abi::ACTIVE_MORPH_WORDS);
   if (extras.result != notUsed) extension.result = extras.result;
   if (extras.hasBox) setBox(extension, extras.box);
-  store(tables, place, extension);
+  tables.store(place, extension);
   return place;
 }
 
+/// `last` and `step` may wrap.
+void Encoder::GroupProgress::add(const abi::InstanceRecord& record, const InstanceExtras* extras) {
+  std::array<std::uint32_t, abi::INSTANCE_WORDS> words;
+  std::memcpy(words.data(), &record, sizeof(words));
+  std::uint32_t differences = 0;
+  for (std::size_t word = 0; word < words.size(); ++word) {
+    const std::uint32_t distance = words[word] - last[word];
+    differences |= distance ^ step[word];
+    step[word] = distance;
+    last[word] = words[word];
+  }
+  if (count++ > 1 && differences != 0) isEven = false;
+  if (extras == nullptr || !extras->hasBox) return;
+  if (box == nullptr) box = &extras->box;
+  if (std::memcmp(box, &extras->box, sizeof(Box)) != 0) isEven = false;
+}
+
 void Encoder::writeInstances() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
-  const std::uint32_t firstRecord = wordsOf(tables);
-  tables.resize(firstRecord + work_->instances.size() * abi::INSTANCE_WORDS);
+  TableWords& tables = plan_->tables;
+  const std::uint32_t firstRecord = tables.grow(work_->instances.size() * abi::INSTANCE_WORDS);
   culledPlaces_.resize(work_->culled.size());
-  filled_.assign(work_->groups.size(), 0);
+  progress_.assign(work_->groups.size(), {});
   listRecords_.clear();
   auto candidate = work_->culled.begin();
   auto list = work_->morphLists.begin();
   for (std::uint32_t number = 0; number < work_->instances.size(); ++number) {
     const Work::Instance& instance = work_->instances[number];
     const std::uint32_t group = work_->groupOf(instance);
-    const std::uint32_t place = work_->groups[group].firstInstance + filled_[group]++;
+    GroupProgress& progress = progress_[group];
+    const std::uint32_t place = work_->groups[group].firstInstance + progress.count;
     const std::uint32_t extension =
         instance.extras != nullptr ? appendExtension(*instance.extras) : 0;
     const PlacedRun& run = *instance.run;
@@ -402,7 +400,8 @@ void Encoder::writeInstances() {
                                      .joints = run.joints | instance.flags,
                                      .extension = extension,
                                      .reserved = 0};
-    store(tables, firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
+    tables.store(firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
+    progress.add(record, instance.extras);
     if (candidate != work_->culled.end() && candidate->instance == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - work_->culled.begin())] = place;
     if (list != work_->morphLists.end() && list->instance == number) {
@@ -418,7 +417,7 @@ void Encoder::writeInstances() {
 
 /// One invocation for each list; a dispatch for those whose weights are in the same buffers.
 Result<void> Encoder::addMorphLists() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
+  TableWords& tables = plan_->tables;
   const std::span<const Work::MorphList> lists = work_->morphLists;
   const auto shareDispatch = [](const Work::MorphList& a, const Work::MorphList& b) {
     return a.buffer == b.buffer && a.drivenBuffer == b.drivenBuffer;
@@ -427,14 +426,12 @@ Result<void> Encoder::addMorphLists() {
     const Work::MorphList& head = lists[begin];
     const auto isLike = [&](const Work::MorphList& list) { return shareDispatch(list, head); };
     if (std::ranges::any_of(lists.first(begin), isLike)) continue;
-    alignToUnit(tables);
-    const std::uint32_t first = wordsOf(tables);
+    tables.alignToUnit();
+    const std::uint32_t first = tables.size();
     for (std::size_t i = begin; i < lists.size(); ++i) {
-      if (!isLike(lists[i])) continue;
-      tables.resize(tables.size() + abi::MORPH_LIST_WORDS);
-      store(tables, tables.size() - abi::MORPH_LIST_WORDS, listRecords_[i]);
+      if (isLike(lists[i])) tables.append(listRecords_[i]);
     }
-    const std::uint32_t count = (wordsOf(tables) - first) / abi::MORPH_LIST_WORDS;
+    const std::uint32_t count = (tables.size() - first) / abi::MORPH_LIST_WORDS;
     if (Result<void> good = addDispatch(variantOf(Kernel::morphLists, plan_->limits, tuning_),
                                         divideUp(count, tuning_.workgroupSize),
                                         abi::MorphListPush{first, count, 0});
@@ -452,57 +449,16 @@ Result<void> Encoder::addMorphLists() {
   return {};
 }
 
-namespace {
-
-/// Whether the difference of each word from record to record is constant.
-bool areEvenlySpaced(std::span<const std::uint32_t> records) {
-  if (records.size() < 2 * abi::INSTANCE_WORDS) return false;
-  std::array<std::uint32_t, abi::INSTANCE_WORDS> expected, step;
-  for (std::size_t word = 0; word < expected.size(); ++word) {
-    expected[word] = records[expected.size() + word];
-    step[word] = records[expected.size() + word] - records[word];
-  }
-  for (std::size_t record = 2; record < records.size() / expected.size(); ++record) {
-    for (std::size_t word = 0; word < expected.size(); ++word) expected[word] += step[word];
-    if (std::memcmp(expected.data(), &records[record * expected.size()], sizeof(expected)) != 0)
-      return false;
-  }
-  return true;
-}
-
-/// Whether the instances have the same box for positions in snorm16.
-bool haveOneBox(std::span<const std::uint32_t> tables, std::span<const std::uint32_t> records) {
-  constexpr std::size_t box = offsetof(abi::ExtensionRecord, centerX) / 4, boxWords = 6;
-  const auto boxOf = [&](std::size_t record) {
-    const auto instance = abi::load<abi::InstanceRecord>(records, record);
-    return tables.subspan(instance.extension + box, boxWords);
-  };
-  for (std::size_t record = 0; record < records.size(); record += abi::INSTANCE_WORDS) {
-    if (!std::ranges::equal(boxOf(record), boxOf(0))) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 /// Instances that the GPU chooses are not: their records are moved.
 void Encoder::markEvenlySpaced(std::uint32_t firstRecord) {
-  std::vector<std::uint32_t>& tables = plan_->tables;
   const std::size_t groups = firstRecord - work_->groups.size() * abi::GROUP_WORDS;
+  constexpr std::size_t word = offsetof(abi::GroupRecord, instancesEach) / 4;
   for (std::size_t place = 0; place < work_->order.size(); ++place) {
-    const Group& group = work_->groups[work_->order[place]];
-    if (group.key.isCulled) continue;
-    const auto records =
-        std::span(std::as_const(tables))
-            .subspan(firstRecord + std::size_t{group.firstInstance} * abi::INSTANCE_WORDS,
-                     std::size_t{group.instances} * abi::INSTANCE_WORDS);
-    if (!areEvenlySpaced(records)) continue;
-    // The kernel reads the box once for all instances that it counts up.
-    if (isSnormPosition(group.variant.positions) && !haveOneBox(tables, records)) continue;
-    const std::size_t word = groups + place * abi::GROUP_WORDS;
-    auto record = abi::load<abi::GroupRecord>(tables, word);
-    record.instancesEach |= abi::EVENLY_SPACED;
-    store(tables, word, record);
+    const GroupProgress& progress = progress_[work_->order[place]];
+    if (work_->groups[work_->order[place]].key.isCulled || !progress.isEven || progress.count < 2)
+      continue;
+    plan_->tables.store(groups + place * abi::GROUP_WORDS + word,
+                        instancesEach_[place] | abi::EVENLY_SPACED);
   }
 }
 
@@ -519,25 +475,24 @@ std::uint32_t Encoder::paletteWord(const Candidate& candidate) const {
 
 /// In the order of the instance records.
 void Encoder::appendCandidates() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
+  TableWords& tables = plan_->tables;
   culled_.firstInstance =
       static_cast<std::uint32_t>(work_->instances.size() - work_->culled.size());
-  alignToUnit(tables);
-  culled_.candidates = wordsOf(tables);
-  tables.resize(tables.size() + work_->culled.size() * abi::CANDIDATE_WORDS);
+  tables.alignToUnit();
+  culled_.candidates = tables.grow(work_->culled.size() * abi::CANDIDATE_WORDS);
   for (std::size_t index = 0; index < work_->culled.size(); ++index) {
     const Candidate& candidate = work_->culled[index].candidate;
     const std::size_t number = culledPlaces_[index] - culled_.firstInstance;
-    store(tables, culled_.candidates + number * abi::CANDIDATE_WORDS,
-          abi::CandidateRecord{candidate.slot, candidate.version, figureWord(candidate),
-                               paletteWord(candidate)});
+    tables.store(culled_.candidates + number * abi::CANDIDATE_WORDS,
+                 abi::CandidateRecord{candidate.slot, candidate.version, figureWord(candidate),
+                                      paletteWord(candidate)});
   }
 }
 
 /// Groups that are culled come last, and so do their dispatches: these get their arguments from the
 /// GPU.
 void Encoder::appendCulledDispatches() {
-  std::vector<std::uint32_t>& tables = plan_->tables;
+  TableWords& tables = plan_->tables;
   culledGroups_ = static_cast<std::uint32_t>(
       std::ranges::count_if(work_->groups, [](const Group& group) { return group.key.isCulled; }));
   const std::uint32_t groupsEnd = culled_.instances;  // instance records follow the groups
@@ -550,17 +505,15 @@ void Encoder::appendCulledDispatches() {
          pushOf(dispatches_[first - 1]).groups >= culled_.groups)
     --first;
   const std::size_t count = dispatches_.size() - first;
-  alignToUnit(tables);
-  culled_.dispatches = wordsOf(tables);
-  culled_.arguments =
-      static_cast<std::uint32_t>(culled_.dispatches + count * abi::CULLED_DISPATCH_WORDS);
-  tables.resize(culled_.arguments + count * abi::INDIRECT_WORDS, 0u);
+  tables.alignToUnit();
+  culled_.dispatches = tables.grow(count * abi::CULLED_DISPATCH_WORDS);
+  culled_.arguments = tables.appendZeros(count * abi::INDIRECT_WORDS);
   for (std::size_t index = 0; index < count; ++index) {
     DispatchCommand& dispatch = dispatches_[first + index].command;
     abi::SkinPush push = pushOf(dispatches_[first + index]);
-    store(tables, culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
-          abi::CulledDispatchRecord{push.groups, push.groupCount,
-                                    dispatches_[first + index].instancesPerInvocation, 0});
+    tables.store(culled_.dispatches + index * abi::CULLED_DISPATCH_WORDS,
+                 abi::CulledDispatchRecord{push.groups, push.groupCount,
+                                           dispatches_[first + index].instancesPerInvocation, 0});
     // Only the GPU knows the number of workgroups. Excess ones find no instance in the last group.
     push.workgroupCount = notUsed;
     setConstants(dispatch, push);
@@ -738,10 +691,10 @@ void Encoder::listFrame(const PlanBuffers& buffers, const FrameWork& frame) {
     append(frame.growth);
     commands.emplace_back(BarrierCommand{Use::copyWrite, copyBoth});
   }
-  if (!plan_->tables.empty()) {
+  if (const std::span<const std::byte> bytes = plan_->tables.bytes(); !bytes.empty()) {
     BufferPart tables = buffers[BufferRole::tables];
-    tables.size = plan_->tables.size() * 4;
-    commands.emplace_back(UploadCommand{tables, std::as_bytes(std::span(plan_->tables))});
+    tables.size = bytes.size();
+    commands.emplace_back(UploadCommand{tables, bytes});
   }
   append(frame.uploads);
   append(frame.moves);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,10 +28,11 @@ struct FrameWork {
 class Encoder {
  public:
   /// Encodes work that was arranged: the tables, and the dispatches that read them. `record`: of a
-  /// scene, its number, from 1. Fails with `limitExceeded` if the tables, or a dispatch, become too
-  /// large.
+  /// scene, its number, from 1. `lent`: where the tables are written, if they fit. Fails with
+  /// `limitExceeded` if the tables, or a dispatch, become too large.
   Result<void> encode(const Work& work, const DeviceLimits& limits, const Tuning& tuning,
-                      const PlanSizes& sizes, PlanData& plan, std::uint32_t record = 0);
+                      const PlanSizes& sizes, PlanData& plan, std::uint32_t record = 0,
+                      std::span<std::byte> lent = {});
   void listBatch(const PlanBuffers& buffers);
   /// Whether the frame has no commands, so that its buffers need no names.
   bool listsNothing(const FrameWork& frame) const;
@@ -47,6 +49,16 @@ class Encoder {
     std::uint32_t drivenBuffer = notUsed;      ///< the same of driven joints and weights
     ByStream<std::uint32_t> windows{};
     std::uint32_t instancesPerInvocation = 0;  ///< at most; of a skin kernel
+  };
+
+  /// The instance records of a group that were written.
+  struct GroupProgress {
+    std::uint32_t count = 0;
+    bool isEven = true;        ///< each word differs by the same from record to record; one box
+    const Box* box = nullptr;  ///< for positions in snorm16, which the kernel then reads once
+    std::array<std::uint32_t, abi::INSTANCE_WORDS> last{}, step{};
+
+    void add(const abi::InstanceRecord& record, const InstanceExtras* extras);
   };
 
   Result<void> addFigureDispatches();
@@ -76,12 +88,13 @@ class Encoder {
   PlanData* plan_ = nullptr;
   const Work* work_ = nullptr;
   Tuning tuning_;
-  std::uint32_t paletteStage_ = 0;           ///< of the palette kernel
-  std::vector<std::uint32_t> figureWords_;   ///< of the first record of each pose buffer
-  std::vector<std::uint32_t> paletteWords_;  ///< the same of each list of palettes
-  std::uint32_t verticesPerInvocation_ = 1;  ///< of the dispatch that is being planned
-  std::vector<std::uint32_t> filled_;        ///< of each group: instances that have a record
-  std::vector<std::uint32_t> culledPlaces_;  ///< of each candidate, among the instance records
+  std::uint32_t paletteStage_ = 0;            ///< of the palette kernel
+  std::vector<std::uint32_t> figureWords_;    ///< of the first record of each pose buffer
+  std::vector<std::uint32_t> paletteWords_;   ///< the same of each list of palettes
+  std::uint32_t verticesPerInvocation_ = 1;   ///< of the dispatch that is being planned
+  std::vector<std::uint32_t> instancesEach_;  ///< of each group record
+  std::vector<GroupProgress> progress_;       ///< of each group
+  std::vector<std::uint32_t> culledPlaces_;   ///< of each candidate, among the instance records
   /// Of each of `Work::morphLists`.
   std::vector<abi::MorphListRecord> listRecords_;
   /// They write tables: those without driven weights before all other dispatches, those with them

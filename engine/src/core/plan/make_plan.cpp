@@ -183,7 +183,7 @@ Result<void> PlanMaker::make(const Batch& batch, const DeviceLimits& limits, con
   PlanBuffers buffers;
   for (std::size_t index = 0; index < bufferRoleCount; ++index) {
     const auto role = static_cast<BufferRole>(index);
-    const std::uint64_t size = sizes.requirement(role, plan.tables.size() * 4, limits).size;
+    const std::uint64_t size = sizes.requirement(role, plan.tables.bytes().size(), limits).size;
     buffers[role] = {static_cast<std::uint32_t>(index), 0, size};
   }
   encoder_.listBatch(buffers);

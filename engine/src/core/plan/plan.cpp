@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <string>
 
 #include "plan/check.h"
@@ -75,7 +74,7 @@ std::optional<std::uint64_t> Plan::resultOffset(std::uint32_t job) const {
 }
 
 BufferRequirement Plan::buffer(BufferRole role) const {
-  return data_->sizes.requirement(role, data_->tables.size() * 4, data_->limits);
+  return data_->sizes.requirement(role, data_->tables.bytes().size(), data_->limits);
 }
 
 BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
@@ -125,12 +124,12 @@ BufferRequirement PlanSizes::requirement(BufferRole role, std::uint64_t tables,
 }
 
 Result<void> writeTables(const Plan& plan, std::span<std::byte> bytes) {
-  const std::vector<std::uint32_t>& tables = PlanData::of(plan).tables;
-  if (bytes.size() < tables.size() * 4) {
-    return invalid("the tables of the plan need " + std::to_string(tables.size() * 4) +
+  const std::span<const std::byte> tables = PlanData::of(plan).tables.bytes();
+  if (bytes.size() < tables.size()) {
+    return invalid("the tables of the plan need " + std::to_string(tables.size()) +
                    " bytes, but only " + std::to_string(bytes.size()) + " were passed");
   }
-  if (!tables.empty()) std::memcpy(bytes.data(), tables.data(), tables.size() * 4);
+  std::ranges::copy(tables, bytes.begin());
   return {};
 }
 

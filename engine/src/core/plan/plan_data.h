@@ -10,6 +10,7 @@
 #include "abi.h"
 #include "dermis/plan.h"
 #include "dermis/result.h"
+#include "plan/table_words.h"
 #include "plan/variant.h"
 
 namespace dermis {
@@ -72,7 +73,7 @@ struct PlanData {
   /// Palette records, the numbers of results to clear, group records, instance records, extensions
   /// (each followed by its active morph targets). If the GPU culls: candidates, their dispatches,
   /// and indirect arguments.
-  std::vector<std::uint32_t> tables;
+  TableWords tables;
   /// Place of each palette in the palettes buffer, for each form, or notUsed.
   std::array<std::vector<std::uint32_t>, paletteFormCount> paletteUnits;
   std::vector<std::uint32_t> results;  ///< each job's number among the results, or notUsed

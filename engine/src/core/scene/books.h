@@ -399,8 +399,8 @@ struct SceneBooks {
   // frame.cpp
   /// Collects all work (`work_`). None of it counts as done before `commit`.
   DERMIS_CORE_API Result<void> gather();
-  /// `gather`, encoded as a plan.
-  DERMIS_CORE_API Result<void> plan(Plan& out);
+  /// `gather`, encoded as a plan. Its tables are written to `tables`, if they fit.
+  DERMIS_CORE_API Result<void> plan(Plan& out, std::span<std::byte> tables);
   DERMIS_CORE_API Result<void> commit();
   DERMIS_CORE_API Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes);
   void begin(std::uint64_t frame, std::uint64_t completedFrame);

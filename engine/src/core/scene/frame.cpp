@@ -336,12 +336,12 @@ void SceneBooks::listUploads() {
   }
 }
 
-Result<void> SceneBooks::plan(Plan& out) {
+Result<void> SceneBooks::plan(Plan& out, std::span<std::byte> tables) {
   if (Result<void> gathered = gather(); !gathered) return gathered;
   isPlanned_ = false;
   PlanData& data = PlanData::of(out);
   const auto record = static_cast<std::uint32_t>(record_ + 1);
-  Result<void> good = encoder_.encode(work_, limits_, tuning_, sizes(), data, record);
+  Result<void> good = encoder_.encode(work_, limits_, tuning_, sizes(), data, record, tables);
   if (good) good = makeFrameBuffers(data);
   if (!good) {
     data.clear();

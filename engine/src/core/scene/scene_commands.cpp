@@ -37,8 +37,8 @@ Scene& SceneCommands::scene() const {
   return *state_->scene;
 }
 
-Result<std::span<const Command>> SceneCommands::plan() {
-  if (Result<void> planned = SceneAccess::books(scene()).plan(state_->plan); !planned)
+Result<std::span<const Command>> SceneCommands::plan(std::span<std::byte> tables) {
+  if (Result<void> planned = SceneAccess::books(scene()).plan(state_->plan, tables); !planned)
     return planned.error();
   return state_->plan.commands();
 }

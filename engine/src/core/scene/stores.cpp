@@ -247,7 +247,7 @@ Result<void> SceneBooks::makeFrameBuffers(const PlanData& plan) {
     retire(std::exchange(buffer, *made));
     return {};
   };
-  const std::uint64_t used = plan.tables.size() * 4;
+  const std::uint64_t used = plan.tables.bytes().size();
   if (tables_.size < used) {
     std::uint64_t size = std::max(tables_.size, leastTables);
     while (size < used) size *= 2;

@@ -22,8 +22,9 @@ class Stopwatch {
 }  // namespace
 
 /// Room for all uploads, one after the other. The slot's last frame is complete. The buffer is kept
-/// for the next frames, which mostly upload tables only, unless meshes made it large.
-Result<void> SceneRecorder::State::makeStaging() {
+/// for the next frames, which mostly upload tables only, unless meshes made it large. `replaced`
+/// gets one that was too small: it may have the tables.
+Result<void> SceneRecorder::State::makeStaging(OwnBuffer& replaced) {
   constexpr std::uint64_t least = 4096, keptOfMeshes = 16 << 10;
   std::uint64_t tables = 0, others = 0;
   for (const Command& command : plan.commands()) {
@@ -39,7 +40,7 @@ Result<void> SceneRecorder::State::makeStaging() {
   Result<OwnBuffer> made = OwnBuffer::create(
       source, {size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, BufferUse::upload, "dermis upload"});
   if (!made) return made.error();
-  own.staging = std::move(*made);
+  replaced = std::exchange(own.staging, std::move(*made));
   own.isStagingKept = others == 0 || size <= keptOfMeshes;
   return {};
 }
@@ -49,7 +50,8 @@ Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const BufferRa
   const ContextState& context = *state.context;
   SceneBooks& books = state.books();
   const Stopwatch planning;
-  if (Result<void> planned = books.plan(state.plan); !planned) return planned;
+  FrameSlot& own = state.slot();
+  if (Result<void> planned = books.plan(state.plan, own.staging.bytes()); !planned) return planned;
   const std::uint32_t alignment = context.limits.minStorageBufferOffsetAlignment;
   if (visibility.offset % alignment != 0) {
     return Error{ErrorCode::invalidArgument,
@@ -64,13 +66,13 @@ Result<void> SceneRecorder::record(VkCommandBuffer commandBuffer, const BufferRa
                      " bytes of words, but visibility has " + std::to_string(given)};
   }
   state.bound[visibilityBuffer].range = {visibility.buffer, visibility.offset, needed};
-  FrameSlot& own = state.slot();
   own.sets.reset();
   if (Result<void> good =
           context.check(state.plan, state.bound, own.sets, "SceneRecorder::prepare");
       !good)
     return good;
-  if (Result<void> made = state.makeStaging(); !made) return made;
+  OwnBuffer replaced;
+  if (Result<void> made = state.makeStaging(replaced); !made) return made;
   const double planSeconds = planning.seconds();
 
   const Stopwatch recording;

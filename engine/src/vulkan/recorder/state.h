@@ -31,7 +31,7 @@ struct SceneRecorder::State {
   void releaseBuffer(std::uint32_t number);
   Result<BufferRange> rangeOf(const Result<BufferPart>& part) const;
   void frameBegun(std::uint64_t completedFrame);
-  Result<void> makeStaging();
+  Result<void> makeStaging(OwnBuffer& replaced);
   SceneBooks& books() const { return SceneAccess::books(*scene); }
 
   /// Of the frame to be recorded.
