@@ -911,10 +911,10 @@ DERMIS_C_API dermis_scene* dermis_commands_scene(dermis_commands* commands);
 // buffer that it copies further, that from COPY_WRITE to COPY_READ. They are
 // valid until the next call of a function of the scene or of this object.
 //
-// `tables`, `table_bytes`: memory for the bytes of the first DERMIS_UPLOAD, for example of a mapped
-// staging buffer that no frame in flight uses, so that nobody needs to copy them; may be null and
-// 0. They begin at its beginning; where it is too small, they are elsewhere. It is written and not
-// read, but when it turns out to be too small.
+// `tables`, `table_bytes`: optional memory for the bytes of the first DERMIS_UPLOAD, for example a
+// mapped staging buffer that no frame in flight uses. This saves copying them. They start at
+// `tables`, unless there are too many: then `bytes` of the upload points elsewhere. This memory is
+// read only if it turns out to be too small.
 DERMIS_C_API dermis_code dermis_commands_plan(dermis_commands* commands, void* tables,
                                               size_t table_bytes, const dermis_command** list,
                                               uint32_t* count, dermis_error* error);

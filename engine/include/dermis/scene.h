@@ -568,10 +568,10 @@ class DERMIS_CORE_API SceneCommands {
   /// `beginFrame` was not called, with `limitExceeded` if the tables are larger than a storage
   /// buffer range, and with the error of `createBuffer`.
   ///
-  /// `tables`: memory for the bytes of the first `UploadCommand`, for example of a mapped staging
-  /// buffer that no frame in flight uses, so that nobody needs to copy them. They begin at its
-  /// beginning; where it is too small, they are elsewhere. It is written and not read, but when it
-  /// turns out to be too small.
+  /// `tables`: optional memory for the bytes of the first `UploadCommand`, for example a mapped
+  /// staging buffer that no frame in flight uses. This saves copying them. They start where this
+  /// memory starts, unless there are too many: then `UploadCommand::bytes` is elsewhere. This
+  /// memory is read only if it turns out to be too small.
   Result<std::span<const Command>> plan(std::span<std::byte> tables = {});
   /// States that the commands of the last `plan` have been recorded, and will be executed in the
   /// order of frames. Without it, the next `plan` lists the same work again. Fails with

@@ -11,7 +11,7 @@
 namespace dermis {
 
 /// Words, in memory that the caller lent, or in memory of their own if that is too small. They are
-/// written and never read, since lent memory may be a mapping of the GPU's.
+/// written, and read only to move them: lent memory may be a mapping that is slow to read.
 class TableWords {
  public:
   /// Forgets all words. Those that follow are written to `lent`.
@@ -60,7 +60,7 @@ class TableWords {
   std::byte* at(std::size_t first, std::size_t count) {
     return memory_.subspan(first * wordBytes, count * wordBytes).data();
   }
-  /// To enough memory of its own, with the first words.
+  /// Moves the first words to own memory, and makes that large enough.
   void move(std::size_t count) {
     const std::size_t needed = size_ * wordBytes;
     std::vector<std::byte> larger(own_.size() < needed ? std::max(needed, 2 * own_.size()) : 0);
