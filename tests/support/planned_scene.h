@@ -62,8 +62,7 @@ class PlannedScene {
     for (const std::byte before : {std::byte{0xff}, std::byte{0x35}}) {
       books().nextVersion_ = version;
       lent_.assign(lentBytes + 4, before);
-      if (Result<void> good = books().plan(planned, std::span(lent_).first(lentBytes)); !good)
-        return good;
+      if (Result<void> good = planOnce(std::span(lent_).first(lentBytes)); !good) return good;
       const std::span<const std::byte> now = PlanData::of(planned).tables.bytes();
       if (before != std::byte{0xff}) {
         EXPECT_TRUE(std::ranges::equal(now, tables)) << "words of the tables were not written";
@@ -77,6 +76,7 @@ class PlannedScene {
     }
     return {};
   }
+  Result<void> planOnce(std::span<std::byte> lent) { return books().plan(planned, lent); }
   Result<void> commit() { return books().commit(); }
   Result<void> readBack(std::uint64_t frame, std::span<const std::byte> bytes) {
     return books().readBack(frame, bytes);

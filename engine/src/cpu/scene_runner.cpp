@@ -312,7 +312,7 @@ TaskInstance SceneRunner::State::taskInstance(const Work::Instance& instance, co
     if (key.strides[stream] == 0) continue;
     // Runs have the place of their first vertex.
     skinned.outputs[stream] = output.data() + key.windows[stream] * windowStep +
-                              instance.run->offsets[stream] -
+                              instance.run.offsets[stream] -
                               std::size_t{key.firstVertex} * key.strides[stream];
   }
   return skinned;
@@ -324,9 +324,8 @@ void SceneRunner::State::placeInstances(const Work& work) {
   resultOf.assign(instances.size(), noResult);
   filled.assign(work.groups.size(), 0);
   for (const Work::Instance& instance : work.instances) {
-    const std::uint32_t number = work.groupOf(instance);
-    const Group& group = work.groups[number];
-    const std::size_t place = group.firstInstance + std::size_t{filled[number]++};
+    const Group& group = work.groups[instance.group];
+    const std::size_t place = group.firstInstance + std::size_t{filled[instance.group]++};
     instances[place] = taskInstance(instance, group);
     if (instance.extras != nullptr && !instances[place].settles)
       resultOf[place] = instance.extras->result;

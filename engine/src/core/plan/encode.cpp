@@ -360,9 +360,7 @@ std::uint32_t Encoder::appendExtension(const InstanceExtras& extras) {
 }
 
 /// `last` and `step` may wrap.
-void Encoder::GroupProgress::add(const abi::InstanceRecord& record, const InstanceExtras* extras) {
-  std::array<std::uint32_t, abi::INSTANCE_WORDS> words;
-  std::memcpy(words.data(), &record, sizeof(words));
+inline void Encoder::GroupProgress::add(const InstanceWords& words, const InstanceExtras* extras) {
   std::uint32_t differences = 0;
   for (std::size_t word = 0; word < words.size(); ++word) {
     const std::uint32_t distance = words[word] - last[word];
@@ -386,22 +384,18 @@ void Encoder::writeInstances() {
   auto list = work_->morphLists.begin();
   for (std::uint32_t number = 0; number < work_->instances.size(); ++number) {
     const Work::Instance& instance = work_->instances[number];
-    const std::uint32_t group = work_->groupOf(instance);
-    GroupProgress& progress = progress_[group];
-    const std::uint32_t place = work_->groups[group].firstInstance + progress.count;
+    GroupProgress& progress = progress_[instance.group];
+    const std::uint32_t place = work_->groups[instance.group].firstInstance + progress.count;
     const std::uint32_t extension =
         instance.extras != nullptr ? appendExtension(*instance.extras) : 0;
-    const PlacedRun& run = *instance.run;
-    const abi::InstanceRecord record{.palette = instance.palette,
-                                     .positions = run.offsets[0],
-                                     .normals = run.offsets[1],
-                                     .tangents = run.offsets[2],
-                                     .previousPositions = run.offsets[3],
-                                     .joints = run.joints | instance.flags,
-                                     .extension = extension,
-                                     .reserved = 0};
-    tables.store(firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, record);
-    progress.add(record, instance.extras);
+    const PlacedRun& run = instance.run;
+    // Not a record in memory, which could be copied only when all its words have arrived there.
+    const InstanceWords words = {instance.palette, run.offsets[0],
+                                 run.offsets[1],   run.offsets[2],
+                                 run.offsets[3],   run.joints | instance.flags,
+                                 extension,        0};
+    tables.storeWords(firstRecord + std::size_t{place} * abi::INSTANCE_WORDS, words);
+    progress.add(words, instance.extras);
     if (candidate != work_->culled.end() && candidate->instance == number)
       culledPlaces_[static_cast<std::size_t>(candidate++ - work_->culled.begin())] = place;
     if (list != work_->morphLists.end() && list->instance == number) {

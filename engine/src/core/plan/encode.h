@@ -51,14 +51,17 @@ class Encoder {
     std::uint32_t instancesPerInvocation = 0;  ///< at most; of a skin kernel
   };
 
+  /// Of an `abi::InstanceRecord`.
+  using InstanceWords = std::array<std::uint32_t, abi::INSTANCE_WORDS>;
+
   /// The instance records of a group that were written.
   struct GroupProgress {
     std::uint32_t count = 0;
     bool isEven = true;        ///< each word differs by the same from record to record; one box
     const Box* box = nullptr;  ///< for positions in snorm16, which the kernel then reads once
-    std::array<std::uint32_t, abi::INSTANCE_WORDS> last{}, step{};
+    InstanceWords last{}, step{};
 
-    void add(const abi::InstanceRecord& record, const InstanceExtras* extras);
+    void add(const InstanceWords& words, const InstanceExtras* extras);
   };
 
   Result<void> addFigureDispatches();

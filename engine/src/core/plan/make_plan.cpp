@@ -150,8 +150,13 @@ void PlanMaker::addJobs(const Batch& batch) {
                                 (job.settles ? abi::INSTANCE_SETTLES : 0u);
     const bool mayHaveExtras = !job.morphs.empty() || results_[index] != notUsed;
     const InstanceExtras* extras = mayHaveExtras ? extrasOf(batch, index) : nullptr;
-    for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run)
-      work_.add({&runs_[run], extras, job.pose, palette, flags});
+    for (std::uint32_t run = firstRuns_[index]; run < firstRuns_[index + 1]; ++run) {
+      Work::Instance& added = work_.add(runs_[run]);
+      added.pose = job.pose;
+      added.extras = extras;
+      added.palette = palette;
+      added.flags = flags;
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -52,6 +53,11 @@ class TableWords {
   template <typename Record>
   void store(std::size_t first, const Record& record) {
     std::memcpy(at(first, sizeof(Record) / wordBytes), &record, sizeof(Record));
+  }
+  template <std::size_t count>
+  void storeWords(std::size_t first, const std::array<std::uint32_t, count>& words) {
+    std::byte* const to = at(first, count);
+    for (std::size_t k = 0; k < count; ++k) std::memcpy(to + k * wordBytes, &words[k], wordBytes);
   }
 
  private:

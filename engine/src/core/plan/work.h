@@ -145,13 +145,13 @@ inline std::uint32_t jointsFor(std::uint64_t words) {
 
 /// What only some instances have.
 struct InstanceExtras {
-  std::vector<MorphWeight> morphs;  ///< in ascending order, without weights of 0
   std::uint32_t result = notUsed;   ///< its number among the results
-  Box box;
+  std::uint32_t writtenMorphs = 0;  ///< targets whose weights are made on the GPU …
+  std::uint32_t drivenMorphs = 0;   ///< … and those after them that a rig drives
   bool hasBox = false;
-  std::uint32_t writtenMorphs = 0;      ///< targets whose weights are made on the GPU …
-  std::uint32_t drivenMorphs = 0;       ///< … and those after them that a rig drives, …
-  std::uint32_t firstDrivenWeight = 0;  ///< … by weights from this one on
+  std::vector<MorphWeight> morphs;  ///< in ascending order, without weights of 0
+  Box box;
+  std::uint32_t firstDrivenWeight = 0;  ///< of those that a rig drives
 
   bool isNeeded() const {
     return !morphs.empty() || result != notUsed || hasBox || writtenMorphs != 0 ||
@@ -211,11 +211,12 @@ struct Work {
     std::uint32_t deviceWords;  ///< the same of `DeviceClips::words`
   };
   struct Instance {
-    const PlacedRun* run;
-    const InstanceExtras* extras;  ///< null if it has none
-    std::uint32_t pose;            ///< index
-    std::uint32_t palette;         ///< the unit where it begins
-    std::uint32_t flags;           ///< abi::INSTANCE_RESTARTS and the like
+    PlacedRun run;
+    std::uint32_t group = 0;                 ///< its number in `groups`
+    std::uint32_t pose = 0;                  ///< index
+    const InstanceExtras* extras = nullptr;  ///< null if it has none
+    std::uint32_t palette = 0;               ///< the unit where it begins
+    std::uint32_t flags = 0;                 ///< abi::INSTANCE_RESTARTS and the like
   };
   /// Poses of one rig whose joints are in one buffer, and driven joints in another.
   struct Rig {
@@ -273,21 +274,28 @@ struct Work {
     of.joints = source.role;
     of.filled |= 1u << kind;
     Poses::List& list = of.lists[kind];
-    list.records.push_back({source.unit, outputUnit, joints, isNeeded ? 1u : 0u});
+    auto& record = list.records.emplace_back();  // written in place, not copied
+    record.matrices = source.unit;
+    record.place = outputUnit;
+    record.jointCount = joints;
+    record.needed = isNeeded ? 1 : 0;
     if (source.drivenBuffer != notUsed)
       list.driven.push_back({source.drivenUnit, source.writtenJoints, 0, 0});
     ++poseCount;
     return {buffers * paletteKindCount + kind, static_cast<std::uint32_t>(list.records.size() - 1)};
   }
-  /// What it points to must stay valid while the work is read.
-  void add(const Instance& instance) {
-    Groups::Entry& entry = groups_->entries_[instance.run->group];
+  /// The caller sets the rest. What it points to must stay valid while the work is read.
+  Instance& add(const PlacedRun& run) {
+    Groups::Entry& entry = groups_->entries_[run.group];
     if (entry.plan != number_) startGroup(entry);
     ++groups[entry.planGroup].instances;
-    instances.push_back(instance);
+    Instance& added = instances.emplace_back();
+    added.run = run;
+    added.group = entry.planGroup;
+    return added;
   }
-  void addCulled(const Instance& instance, const Candidate& candidate) {
-    add(instance);
+  /// The GPU may choose the instance that was added last.
+  void cull(const Candidate& candidate) {
     culled.push_back({static_cast<std::uint32_t>(instances.size() - 1), candidate});
   }
 
@@ -295,10 +303,6 @@ struct Work {
   void arrange();
   /// Whether two groups are skinned by one dispatch.
   bool shareDispatch(std::uint32_t group, std::uint32_t other) const;
-  /// Number of the group of an instance.
-  std::uint32_t groupOf(const Instance& instance) const {
-    return groups_->entries_[instance.run->group].planGroup;
-  }
 
  private:
   void startGroup(Groups::Entry& entry);

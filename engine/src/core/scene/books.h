@@ -106,30 +106,32 @@ struct ScenePose {
     PalettePlace place;            ///< … and its place among the palettes of the work
   };
 
-  std::uint32_t jointCount = 0;     ///< of all, and …
-  std::uint32_t writtenJoints = 0;  ///< … without those that a rig drives
-  std::uint32_t slotJoints = 0;     ///< of a slot: these, and room for given weights
+  // The members that frames read come first, in the order in which they share cache lines.
+  std::uint32_t jointCount = 0;  ///< of all, and …
+  std::uint32_t slotJoints = 0;  ///< … of a slot: these, and room for given weights
   JointPromise promise = JointPromise::scaling;
   bool writtenByGpu = false;
   std::uint32_t figure = notUsed;  ///< to which it belongs
-  std::uint32_t buffer = 0;        ///< its number
-  Range joints;                    ///< in that buffer, of all slots together
   std::uint32_t rig = notUsed;     ///< index
-  /// Where the driven joints are, and behind them all weights. On the CPU a copy of the others
-  /// comes before them.
-  Range driven;
-  std::uint32_t drivenBuffer = 0;
-  std::uint64_t drivenVersion = 0;  ///< of the pose, that is there; 0: it is computed again
-  std::uint64_t drivenPlan = 0;     ///< the plan that computes it
+  std::uint32_t buffer = 0;        ///< its number
   /// The slot that has the current pose. Poses that the CPU writes have a slot for each frame in
   /// flight.
   std::uint32_t slot = 0;
-  std::uint64_t poseFrame = 0;   ///< the frame that it was last written in
-  std::uint64_t uploadedBy = 0;  ///< the plan that lists its upload
-  std::uint64_t version = 1;
-  std::array<Form, paletteFormCount> forms;
-  std::uint32_t users = 0;
   std::uint32_t firstInstance = notUsed;  ///< of the linked list of its instances
+  std::uint32_t users = 0;                ///< instances
+  std::uint64_t version = 1;
+  std::uint64_t poseFrame = 0;  ///< the frame that it was last written in
+  Range joints;                 ///< in its buffer, of all slots together
+  std::array<Form, paletteFormCount> forms;
+
+  std::uint64_t uploadedBy = 0;     ///< the plan that lists its upload
+  std::uint32_t writtenJoints = 0;  ///< without those that a rig drives
+  std::uint32_t drivenBuffer = 0;
+  /// Where the driven joints are, and behind them all weights. On the CPU a copy of the others
+  /// comes before them.
+  Range driven;
+  std::uint64_t drivenVersion = 0;  ///< of the pose, that is there; 0: it is computed again
+  std::uint64_t drivenPlan = 0;     ///< the plan that computes it
 };
 
 struct SceneClips {
@@ -196,22 +198,25 @@ struct InstanceState {
 };
 
 struct SceneInstance {
-  // The members that a frame reads to skin an instance come first, the first of them in the cache
-  // line that begins the slot. With lavapipe, skinning evicts instances from the caches, so each
-  // cache line must be fetched again in the next frame.
+  // The members that a frame reads to skin an instance come first, in two cache lines, of which the
+  // first begins the slot. With lavapipe, skinning evicts instances from the caches, so each cache
+  // line must be fetched again in the next frame.
   bool isShifting = false;  ///< among the shifting
+  bool isWritten = false;   ///< `InstanceOutput::isWritten`
   Method method = Method::dualQuaternion;
-  std::uint32_t pose = 0;  ///< index
-  std::uint32_t vertexCount = 0;
-  std::uint32_t vertexBytes = 0;  ///< that are written for a vertex
-  std::uint64_t plannedIn = 0;    ///< the last plan that skins or settles it
-  std::uint32_t nextOfPose = notUsed, previousOfPose = notUsed;
+  std::uint32_t pose = 0;        ///< index
+  std::uint64_t plannedIn = 0;   ///< the last plan that skins or settles it
   std::uint64_t firstFrame = 0;  ///< in which it was skinned
-  PlacedRun run;                 ///< the first, and mostly the only one
+  std::uint32_t nextOfPose = notUsed;
+  std::uint32_t vertexCount = 0;
+  PlacedRun run;                  ///< the first, and mostly the only one
+  std::uint32_t vertexBytes = 0;  ///< that are written for a vertex
+  std::uint32_t previousOfPose = notUsed;
+  std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
+  InstanceExtras extras;
+
   VertexLayout layout;
   Place target;  ///< where it is skinned to
-  InstanceExtras extras;
-  std::vector<PlacedRun> furtherRuns;  ///< of instances that no single output range holds
 
   // Of those culled on the GPU.
   std::uint32_t version = 0;  ///< of what it should show, as of the last record
@@ -233,7 +238,6 @@ struct SceneInstance {
   std::uint32_t drivenTargets = 0;    ///< as in its description
   std::uint32_t weightsBuffer = 0;    ///< of poses, that has the weights which the GPU writes …
   Range weights;                      ///< … and where they are there, in joints
-  bool isWritten = false;             ///< `InstanceOutput::isWritten`
   std::optional<Place> shown;         ///< where it was last recorded
 
   const Place& place() const { return shown ? *shown : target; }
@@ -514,8 +518,8 @@ struct SceneBooks {
   };
   std::vector<Versioned> versioned_;  ///< culled, with something new to show
   struct Conversion {
-    PoseHandle pose;
-    std::size_t form;
+    std::uint32_t pose;  ///< index
+    PaletteForm form;
     bool isNeeded;  ///< whatever the GPU culls
   };
   std::vector<Conversion> conversions_;

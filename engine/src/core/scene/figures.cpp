@@ -166,7 +166,7 @@ Result<void> Scene::play(std::span<const FigurePlay> plays) {
   for (std::size_t entry = 0; entry < plays.size(); ++entry) {
     const FigurePlay& play = plays[entry];
     if (entry + prefetchDistance < plays.size())
-      books.figures_.prefetch(plays[entry + prefetchDistance].figure.index);
+      books.figures_.prefetch(plays[entry + prefetchDistance].figure.index, 4);
     const auto refused = [&](const Error& error) {
       return Error{error.code, "entry " + std::to_string(entry) + ": " + error.message};
     };

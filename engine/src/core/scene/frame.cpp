@@ -68,7 +68,8 @@ std::uint32_t SceneBooks::convertPalette(const SceneInstance& instance, bool isC
   } else if (isDriven) {
     driveRig(instance.pose, notUsed);
   }
-  conversions_.push_back({instance.poseHandle, static_cast<std::size_t>(form), isNeeded});
+  conversions_.push_back({instance.pose, form, isNeeded});
+  if (!pose.writtenByGpu) planned_.poseBytes += pose.slotJoints * sizeof(JointMatrix);
   PoseSource source{static_cast<std::uint32_t>(offsetOf(pose) / unitBytes), pose.buffer,
                     pose.writtenByGpu ? BufferRole::gpuPoses : BufferRole::poses};
   if (pose.rig != notUsed) {
@@ -87,12 +88,12 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t palette, s
   const bool listsMorphs = extras != nullptr && extras->writtenMorphs + extras->drivenMorphs != 0 &&
                            (flags & abi::INSTANCE_SETTLES) == 0 && !owner_.isCpu;
   const auto add = [&](const PlacedRun& run) {
-    const Work::Instance skinned{&run, extras, instance.pose, palette, flags};
-    if (candidate != nullptr) {
-      work_.addCulled(skinned, *candidate);
-    } else {
-      work_.add(skinned);
-    }
+    Work::Instance& added = work_.add(run);
+    added.pose = instance.pose;
+    added.extras = extras;
+    added.palette = palette;
+    added.flags = flags;
+    if (candidate != nullptr) work_.cull(*candidate);
     if (listsMorphs) listMorphs(instance);
   };
   add(instance.run);
@@ -101,12 +102,16 @@ void SceneBooks::addRuns(const SceneInstance& instance, std::uint32_t palette, s
 
 void SceneBooks::gatherPoses() {
   for (std::size_t i = 0; i < posed_.size(); ++i) {
-    if (i + prefetchDistance < posed_.size()) poses_.prefetch(posed_[i + prefetchDistance].index);
+    if (i + prefetchDistance < posed_.size())
+      poses_.prefetch(posed_[i + prefetchDistance].index, 2);
     const ScenePose* pose = poses_.find(posed_[i]);
     if (pose == nullptr) continue;
-    for (std::uint32_t index = pose->firstInstance; index != notUsed;
-         index = instances_.at(index).nextOfPose)
+    std::uint32_t index = pose->firstInstance;
+    if (pose->users == 1) {  // an instance that need not be read
       raise(index, Need::stale);
+      continue;
+    }
+    for (; index != notUsed; index = instances_.at(index).nextOfPose) raise(index, Need::stale);
   }
   posed_.clear();
 }
@@ -132,7 +137,9 @@ void SceneBooks::gatherPending() {
   for (std::size_t entry = 0; entry < pending_.size(); ++entry) {
     const InstanceHandle handle = pending_[entry];
     if (entry + prefetchDistance < pending_.size())
-      instances_.prefetch(pending_[entry + prefetchDistance].index);
+      instances_.prefetch(pending_[entry + prefetchDistance].index, 2);
+    if (entry + prefetchDistance / 2 < pending_.size())
+      poses_.prefetch(instances_.at(pending_[entry + prefetchDistance / 2].index).pose, 2);
     InstanceState* const state = findState(handle);
     if (state == nullptr) continue;
     if (state->need == Need::none || !isDisplayed(state->view)) {
@@ -280,10 +287,6 @@ Result<void> SceneBooks::gather() {
   gatherFigures();
   gatherResults();
   work_.arrange();
-  for (const Conversion& conversion : conversions_) {
-    const ScenePose& pose = poses_.at(conversion.pose.index);
-    if (!pose.writtenByGpu) planned_.poseBytes += pose.slotJoints * sizeof(JointMatrix);
-  }
   planned_.frame = frame_;
   planned_.instances = instances_.size();
   planned_.skinnedInstances = static_cast<std::uint32_t>(due_.size());
@@ -424,10 +427,13 @@ Result<void> SceneBooks::commit() {
   skinned_.clear();
   settled_.clear();
   moving_.swap(held_);
-  for (const Conversion& conversion : conversions_) {
+  for (std::size_t i = 0; i < conversions_.size(); ++i) {
+    if (i + prefetchDistance < conversions_.size())
+      poses_.prefetch(conversions_[i + prefetchDistance].pose, 2);
+    const Conversion& conversion = conversions_[i];
     if (!conversion.isNeeded) continue;
-    ScenePose& pose = poses_.at(conversion.pose.index);
-    pose.forms[conversion.form].version = pose.version;
+    ScenePose& pose = poses_.at(conversion.pose);
+    pose.forms[static_cast<std::size_t>(conversion.form)].version = pose.version;
   }
   for (const std::uint32_t index : sampling_) {
     SceneFigure& figure = figures_.at(index);
@@ -437,7 +443,10 @@ Result<void> SceneBooks::commit() {
     ScenePose& pose = poses_.at(index);
     pose.drivenVersion = pose.version;
   }
-  for (const auto& [index, restarts] : due_) {
+  for (std::size_t i = 0; i < due_.size(); ++i) {
+    if (i + prefetchDistance < due_.size())
+      instances_.prefetch(due_[i + prefetchDistance].index, 1);
+    const auto& [index, restarts] = due_[i];
     InstanceState& state = states_[index];
     const InstanceHandle handle{index, state.generation};
     const bool moves = state.hasMotion && !restarts;

@@ -68,16 +68,17 @@ class SlotMap {
   /// Larger than every index so far.
   std::uint32_t capacity() const { return static_cast<std::uint32_t>(slots_.size()); }
 
-  /// Fetches what `find` and `at` will soon be asked for into the caches.
-  void prefetch(std::uint32_t index) const {
+  /// Fetches the first cache lines of what `find` and `at` will soon be asked for.
+  void prefetch(std::uint32_t index, std::size_t most) const {
 #if defined(__GNUC__)
     if (index >= slots_.size()) return;
     const auto* const bytes = reinterpret_cast<const char*>(&slots_[index]);
-    constexpr std::size_t lines = sizeof(Slot) / alignof(Slot);
-    for (std::size_t line = 0; line < std::min<std::size_t>(lines, 4); ++line)
+    const std::size_t lines = std::min(sizeof(Slot) / alignof(Slot), most);
+    for (std::size_t line = 0; line < lines; ++line)
       __builtin_prefetch(bytes + line * alignof(Slot));
 #else
     static_cast<void>(index);
+    static_cast<void>(most);
 #endif
   }
 
