@@ -81,19 +81,21 @@ inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& p
 
 #ifndef DERMIS_CPU_STAGES_ONLY
 
-/// Whether plain_inl.h can skin these instances.
-inline bool isPlain(const Task& task, const TaskInstance* const* instances, std::size_t count) {
-  if (task.method != Method::dualQuaternion && task.method != Method::linear) return false;
-  if (task.places.hasMotion() || task.places[Stream::tangents].format != VertexFormat::none ||
-      !areSideBySide(task.places, instances, count))
-    return false;
-  return std::all_of(instances, instances + count, [](const TaskInstance* instance) {
+/// How plain_inl.h can skin these instances, if it can.
+inline PlainVertex plainVertexOf(const Task& task, const TaskInstance* const* instances,
+                                 std::size_t count) {
+  if (task.method != Method::dualQuaternion && task.method != Method::linear)
+    return PlainVertex::none;
+  const auto isPlain = [](const TaskInstance* instance) {
     return instance->morphs.empty() && instance->result == nullptr;
-  });
+  };
+  if (task.places.hasMotion() || !std::all_of(instances, instances + count, isPlain))
+    return PlainVertex::none;
+  return plainVertexOf(task.places, instances, count);
 }
 
 /// Skins the vertices of a job, whole blocks in place and others beside the output.
-template <class D>
+template <PlainVertex vertex, class D>
 inline HWY_ATTR void skinPlainly(D d, const SectionTask& part, const Palette& palette,
                                  const TaskInstance* const* instances) {
   float* outputs[blocksOf<D>];
@@ -102,17 +104,17 @@ inline HWY_ATTR void skinPlainly(D d, const SectionTask& part, const Palette& pa
   const auto skin = [&](const PlainTask& task, float* const* to) HWY_ATTR {
     byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
       if (part.task.method == Method::linear) {
-        skinInstances<PlainKind::moved, influences()>(d, task, palette, to);
+        skinInstances<PlainKind::moved, vertex, influences()>(d, task, palette, to);
       } else if (palette.scales) {
-        skinInstances<PlainKind::scaled, influences()>(d, task, palette, to);
+        skinInstances<PlainKind::scaled, vertex, influences()>(d, task, palette, to);
       } else {
-        skinInstances<PlainKind::turned, influences()>(d, task, palette, to);
+        skinInstances<PlainKind::turned, vertex, influences()>(d, task, palette, to);
       }
     });
   };
   forTiles(part, ~std::uint32_t{0} / blockVertices / 2,
            [&](const Blocks& blocks, const VertexRange& range)
-               HWY_ATTR { skinBlocks<D>(*part.task.mesh, blocks, range, outputs, skin); });
+               HWY_ATTR { skinBlocks<vertex, D>(*part.task.mesh, blocks, range, outputs, skin); });
 }
 
 #endif  // DERMIS_CPU_STAGES_ONLY
@@ -126,8 +128,14 @@ inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Group& gro
   palette.isModerate = isModerate;
 #ifndef DERMIS_CPU_STAGES_ONLY
   if constexpr (!isLone) {
-    if (isModerate && isPlain(part.task, instances, blocksOf<D>))
-      return skinPlainly(d, part, palette, instances);
+    switch (isModerate ? plainVertexOf(part.task, instances, blocksOf<D>) : PlainVertex::none) {
+      case PlainVertex::normals:
+        return skinPlainly<PlainVertex::normals>(d, part, palette, instances);
+      case PlainVertex::tangents:
+        return skinPlainly<PlainVertex::tangents>(d, part, palette, instances);
+      case PlainVertex::none:
+        break;
+    }
   }
 #endif
   skinByStages<isLone>(d, part, palette, instances);

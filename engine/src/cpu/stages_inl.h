@@ -32,7 +32,6 @@ struct Company {
   ActiveTargets* morphs;  ///< of each instance
   Records records = recordsOf(task.places, instances, count);
   bool isMorphed = !instances[0]->morphs.empty();
-  bool isSideBySide = areSideBySide(task.places, instances, count);
   bool hasResults = std::any_of(instances, instances + count, [](const TaskInstance* instance) {
     return instance->result != nullptr;
   });
@@ -128,8 +127,7 @@ inline HWY_ATTR void storeTile(D d, const Company& company, std::size_t vertex, 
     std::byte* to[blocksOf<D>];
     for (std::size_t i = 0; i < company.count; ++i)
       to[i] = company.instances[i]->outputs[record.stream] + vertex * stride;
-    storeRecord<isLone>(d, record, company.isSideBySide && record.stream == Stream::positions,
-                        stride, to, range, tile);
+    storeRecord<isLone>(d, record, stride, to, range, tile);
   }
   copyPositions(true);
 }

@@ -2,8 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
+#include <span>
+#include <type_traits>
 
+#include "cpu/dense_inl.h"
 #include "cpu/encode_inl.h"
 #include "cpu/tile_inl.h"
 
@@ -45,6 +49,7 @@ struct Record {
   Stream stream{};             ///< of the first
   std::uint32_t bytes = 0;     ///< more than 4 only in whole words
   std::uint32_t slots = 0;     ///< number of `slot`
+  std::uint32_t dense = 0;     ///< words of a vertex that `storeDense` can store, or 0
   std::uint8_t slot[12] = {};  ///< in the order of words
 };
 
@@ -69,13 +74,22 @@ inline Records recordsOf(const VertexPlaces& places, const TaskInstance* const* 
       });
     };
     if (records.count == 0 || !follows(records.all[records.count - 1])) {
-      records.all[records.count++] = {stream, 0, 0, {}};
+      records.all[records.count++].stream = stream;
     }
     Record& record = records.all[records.count - 1];
     record.bytes += bytes;
     for (std::uint32_t k = 0; k < (bytes + 3) / 4; ++k)
       record.slot[record.slots++] =
           static_cast<std::uint8_t>(static_cast<std::size_t>(stream) * 4 + k);
+  }
+  for (Record& record : std::span(records.all).first(records.count)) {
+    const bool isDense = record.bytes == places[record.stream].stride && record.bytes % 4 == 0 &&
+                         isDenseSize(record.slots);
+    const auto isAligned = [&](const TaskInstance* instance) {
+      return reinterpret_cast<std::uintptr_t>(instance->outputs[record.stream]) % 4 == 0;
+    };
+    if (isDense && std::all_of(instances, instances + instanceCount, isAligned))
+      record.dense = record.slots;
   }
   return records;
 }
@@ -163,19 +177,22 @@ HWY_NOINLINE HWY_ATTR void storeUnits(D d, const Quad& quad, std::size_t stride,
   }
 }
 
-/// Stores positions and normals as float32x3, side by side, of whole units.
-template <bool isLone, class D>
-HWY_NOINLINE HWY_ATTR void storeSideBySide(D d, std::byte* const* to, std::size_t first,
-                                           std::size_t end, const Tile<D>& tile) {
+/// Stores whole units of dense vertices, whose words are those of the record.
+template <bool isLone, std::size_t count, class D>
+HWY_NOINLINE HWY_ATTR void storeDenseUnits(D d, const Record& record, std::byte* const* to,
+                                           std::size_t first, std::size_t end,
+                                           const Tile<D>& tile) {
+  constexpr std::size_t step = unitVertices<isLone, D> * count;
   float* places[blocksOf<D>];
   for (std::size_t i = 0; i < blocksOf<D>; ++i) {
-    places[i] = reinterpret_cast<float*>(to[isLone ? 0 : i]) +
-                (first * unitVertices<isLone, D> + (isLone ? i * 4 : 0)) * vertexFloats;
+    places[i] =
+        reinterpret_cast<float*>(to[isLone ? 0 : i]) + first * step + (isLone ? i * 4 * count : 0);
   }
   for (std::size_t unit = first; unit < end; ++unit) {
-    const Vec<D>* const v = tile.slots[unit];
-    storeVertices(d, threeOf<D>(v), threeOf<D>(v + 4), places);
-    for (float*& next : places) next += unitVertices<isLone, D> * vertexFloats;
+    Vec<D> words[count];
+    for (std::size_t k = 0; k < count; ++k) words[k] = tile.slots[unit][record.slot[k]];
+    storeDense(d, words, places);
+    for (float*& next : places) next += step;
   }
 }
 
@@ -199,23 +216,41 @@ HWY_NOINLINE HWY_ATTR void storeSome(D d, const Quad& quad, std::size_t stride,
   }
 }
 
+/// Calls `store` with the number of words of a dense vertex as a constant.
+template <class Store>
+DERMIS_INLINE void byDenseSize(std::uint32_t words, const Store& store) {
+  switch (words) {
+    case 3:
+      return store(std::integral_constant<std::size_t, 3>());
+    case 5:
+      return store(std::integral_constant<std::size_t, 5>());
+    case 6:
+      return store(std::integral_constant<std::size_t, 6>());
+    case 10:
+      return store(std::integral_constant<std::size_t, 10>());
+    default:
+      return;
+  }
+}
+
 /// Stores the vertices of a tile. `to`: where the first vertex of each instance goes.
-/// `isSideBySide`: the record is what `storeSideBySide` stores.
 template <bool isLone, class D>
-inline HWY_ATTR void storeRecord(D d, const Record& record, bool isSideBySide, std::size_t stride,
+inline HWY_ATTR void storeRecord(D d, const Record& record, std::size_t stride,
                                  std::byte* const* to, const VertexRange& range,
                                  const Tile<D>& tile) {
   constexpr std::size_t vertices = unitVertices<isLone, D>;
   const std::size_t whole = (range.first + vertices - 1) / vertices;
   const std::size_t wholeEnd = std::max(whole, range.end / vertices);
-  if (isSideBySide) storeSideBySide<isLone>(d, to, whole, wholeEnd, tile);
+  byDenseSize(record.dense, [&](auto words) HWY_ATTR {
+    storeDenseUnits<isLone, words()>(d, record, to, whole, wholeEnd, tile);
+  });
   for (std::size_t first = 0; first < record.slots; first += 4) {
     Quad quad{{}, std::min<std::size_t>(record.bytes - first * 4, 16), first * 4};
     for (std::size_t k = 0; k < 4; ++k)
       quad.slot[k] = record.slot[std::min<std::size_t>(first + k, record.slots - 1)];
     if (range.first != whole * vertices)
       storeSome<isLone>(d, quad, stride, to, range.first / vertices, range, tile);
-    if (!isSideBySide) {
+    if (record.dense == 0) {
       bySize(static_cast<std::uint32_t>(quad.bytes), [&](auto size) HWY_ATTR {
         if (size() % 4 == 0 && stride == size()) {
           storeUnits<isLone, size(), size() < 16>(d, quad, stride, to, whole, wholeEnd, tile);
