@@ -1,16 +1,21 @@
-// The bits of the CPU path are the same on every processor: those that were recorded here, on
-// x86-64 and on arm64. What goes in is made without a mathematical library, which may round as it
-// likes.
+// The bits of the CPU path, and of poses from clips and rigs, are the same on every processor:
+// those that were recorded here, on x86-64 and on arm64. What goes in is made without a
+// mathematical library, which may round as it likes.
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "dermis/cpu.h"
 #include "dermis/mesh.h"
+#include "played_clips.h"
+#include "rigged.h"
 
 namespace dermis::test {
 namespace {
@@ -142,6 +147,33 @@ TEST(CpuProcessorTest, BitsAreThoseThatWereRecorded) {
     EXPECT_EQ(hashOfMethod(Method::bulgeControlled), 0x4e58416768a26aaeu);
   }
   EXPECT_TRUE(cpu::setTarget({}).ok());
+}
+
+template <typename Number>
+std::uint64_t hashOf(std::span<const Number> numbers, std::uint64_t hash) {
+  const std::span<const std::byte> bytes = std::as_bytes(numbers);
+  return hashOf(std::vector<std::byte>(bytes.begin(), bytes.end()), hash);
+}
+
+TEST(CpuProcessorTest, PosesOfClipsHaveTheBitsThatWereRecorded) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (std::uint32_t play = 0; play < playCount; ++play) {
+    for (std::uint32_t skin = 0; skin < playedClips().skinCount(); ++skin)
+      hash = hashOf(std::span<const JointMatrix>(playedPose(play, skin)), hash);
+  }
+  EXPECT_EQ(hashOf(playedClips().bytes(), 0xcbf29ce484222325u), 0x1a6de4d4f063391eu);
+  EXPECT_EQ(hash, 0xf68ce5ea81661f64u);
+}
+
+TEST(CpuProcessorTest, WhatRigsDriveHasTheBitsThatWereRecorded) {
+  Numbers numbers;
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int count = 0; count < 20; ++count) {
+    const std::vector<JointMatrix> written = pose(numbers, count % 2 != 0);
+    const Driven driven = evaluated(smallRig(), std::span(written).first(smallWritten), {});
+    hash = hashOf(std::span<const JointMatrix>(driven.joints), hash);
+  }
+  EXPECT_EQ(hash, 0x5614b89a653204a4u);
 }
 
 }  // namespace
