@@ -3,9 +3,11 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <thread>
 #include <vector>
 
 #include "clips/sample.h"
@@ -50,13 +52,17 @@ class SharedWork {
       if (state_.compare_exchange_strong(found, State::busy, std::memory_order_acquire)) {
         work();
         state_.store(State::done, std::memory_order_release);
-        state_.notify_all();
         return;
       }
     }
-    while (found != State::done) {
-      state_.wait(found, std::memory_order_acquire);
-      found = state_.load(std::memory_order_acquire);
+    // Not `wait`: where there is no futex, that of GCC 12 may miss the notification (MinGW). The
+    // work takes microseconds, unless its thread was interrupted, which sleeping lets continue.
+    for (int turn = 0; state_.load(std::memory_order_acquire) != State::done; ++turn) {
+      if (turn < 1000) {
+        std::this_thread::yield();
+      } else {
+        std::this_thread::sleep_for(std::chrono::microseconds(100));
+      }
     }
   }
 
