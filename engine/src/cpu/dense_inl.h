@@ -53,7 +53,7 @@ DERMIS_INLINE void storeChunks(Sixteen, const Vec<Sixteen> (&chunks)[count], flo
 }
 #endif
 
-/// Whether `storeDense` can store vertices of so many words.
+/// Whether `storeDense` can store vertices of this many words.
 inline constexpr bool isDenseSize(std::size_t words) {
   return words == 3 || words == 5 || words == 6 || words == 10;
 }
