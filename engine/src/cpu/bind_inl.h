@@ -2,7 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cstring>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -12,30 +12,41 @@
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
 
-/// Where the vertices of a tile are read from. In the mesh a vertex is the same for all instances.
+/// Where the vertices of a tile are read from.
 struct Source {
   const float *positions = nullptr, *normals = nullptr, *tangents = nullptr;
   const float *givenNormals = nullptr, *givenTangents = nullptr;
   const float *centers = nullptr, *shares = nullptr;
-  bool isWhole = false;  ///< a vector for each component, except of centers and shares
+  bool isTile = false;  ///< the tile has them, but not centers and shares
+};
+
+/// How the vertices of a unit are read.
+enum class From : std::uint8_t {
+  lone,     ///< from a block of the mesh, into the lanes
+  company,  ///< from a block of the mesh, the same for all lanes
+  tile,     ///< from the tile: a vector for each component
 };
 
 /// Component `index` of `components` of a unit's vertices.
-template <bool isWhole, class D>
+template <From from, class D>
 DERMIS_INLINE Vec<D> loadComponent(D d, const float* first, std::size_t components,
                                    std::size_t index, std::size_t unit) {
-  if constexpr (isWhole) {
-    return hn::Load(d, first + (unit * components + index) * hn::MaxLanes(d));
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  constexpr std::size_t perBlock = from == From::lone ? blockVertices / lanes : blockVertices;
+  const std::size_t component = (unit / perBlock * components + index) * blockVertices;
+  if constexpr (from == From::tile) {
+    return hn::Load(d, first + (unit * components + index) * lanes);
+  } else if constexpr (from == From::company) {
+    return hn::Set(d, first[component + unit % perBlock]);
   } else {
-    return hn::LoadDup128(d,
-                          first + (unit / 2 * components + index) * blockVertices + unit % 2 * 4);
+    return hn::Load(d, first + component + unit % perBlock * lanes);
   }
 }
-template <bool isWhole, class D>
+template <From from, class D>
 DERMIS_INLINE Vec3<D> loadThree(D d, const float* first, std::size_t components, std::size_t unit) {
-  return {loadComponent<isWhole>(d, first, components, 0, unit),
-          loadComponent<isWhole>(d, first, components, 1, unit),
-          loadComponent<isWhole>(d, first, components, 2, unit)};
+  return {loadComponent<from>(d, first, components, 0, unit),
+          loadComponent<from>(d, first, components, 1, unit),
+          loadComponent<from>(d, first, components, 2, unit)};
 }
 
 inline const float* blockOf(const std::vector<Lanes>& lanes, std::size_t components,
@@ -43,7 +54,7 @@ inline const float* blockOf(const std::vector<Lanes>& lanes, std::size_t compone
   return lanes.empty() ? nullptr : numbersOf(&lanes[block * components]);
 }
 
-inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block, bool isLone) {
+inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block) {
   Source from;
   from.positions = blockOf(mesh.positions, 3, block);
   from.normals = blockOf(mesh.normals, 3, block);
@@ -53,7 +64,6 @@ inline Source sourceOf(const MeshData& mesh, Method method, std::uint32_t block,
   from.centers = blockOf(mesh.centers, 3, block);
   from.shares = method == Method::blended ? blockOf(mesh.dualQuaternionWeights, 1, block)
                                           : blockOf(mesh.bulgeStrengths, 1, block);
-  from.isWhole = isLone;
   return from;
 }
 
@@ -124,45 +134,52 @@ inline HWY_ATTR void morphBlock(const MeshData& mesh, std::uint32_t number, Acti
   }
 }
 
-/// Morphs the blocks of a tile for instances that have active targets.
+/// Morphs the vertices of a tile for instances that have active targets. `active`: those of each.
 template <bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t firstBlock,
-                                     std::uint32_t blockEnd, ActiveTargets* active, Tile<D>& tile,
-                                     Source& from) {
-  const auto scatter = [&](const Lanes& lanes, std::size_t unit, std::size_t i, Vec<D>* to) {
-    // The memory of a vector is its lanes, in order.
-    auto* const memory = reinterpret_cast<std::byte*>(to);
-    if constexpr (isLone) {
-      std::memcpy(memory, lanes.v, sizeof(lanes.v));
-    } else {
-      std::memcpy(memory + i * 16, lanes.v + unit % 2 * 4, 16);
-    }
-  };
-  constexpr std::size_t unitsEach = isLone ? 1 : 2;
-  const std::size_t units =
-      std::min<std::size_t>((blockEnd - firstBlock) * unitsEach, Tile<D>::most);
+                                     std::uint32_t blockEnd, ActiveTargets* active,
+                                     std::size_t count, Tile<D>& tile, Source& from) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), step = isLone ? lanes : 4;
   const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
-  for (std::size_t i = 0; i < (isLone ? 1 : blocksOf<D>); ++i) {
-    for (std::size_t k = 0; k < units / unitsEach; ++k) {
-      MorphedBlock& block = tile.blocks[k];
-      const std::size_t number = firstBlock + k;
+  const float* blocks[lanes];
+  for (std::size_t i = 0; i < lanes; ++i)
+    blocks[i] = numbersOf(tile.blocks[std::min(i, count - 1)].positions);
+  std::size_t units = 0;
+  for (std::size_t number = firstBlock; number < blockEnd; ++number) {
+    for (std::size_t i = 0; i < count; ++i) {
+      MorphedBlock& block = tile.blocks[i];
       std::copy_n(mesh.positions.data() + number * 3, 3, block.positions);
       if (normals) std::copy_n(mesh.givenNormals.data() + number * 3, 3, block.normals);
       if (tangents) {
         std::copy_n(mesh.givenTangents.data() + number * 4, 3, block.tangents);
         block.tangents[3] = mesh.tangents[number * 4 + 3];
       }
-      morphBlock(mesh, firstBlock + static_cast<std::uint32_t>(k), active[i], block);
+      morphBlock(mesh, static_cast<std::uint32_t>(number), active[i], block);
     }
-    for (std::size_t unit = 0; unit < units; ++unit) {
-      const MorphedBlock& block = tile.blocks[unit / unitsEach];
-      for (std::size_t c = 0; c < 3; ++c) {
-        scatter(block.positions[c], unit, i, &tile.positions[unit][c]);
-        if (normals) scatter(block.normals[c], unit, i, &tile.givenNormals[unit][c]);
-        if (tangents) scatter(block.tangents[c], unit, i, &tile.givenTangents[unit][c]);
+    // Component `component` of a morphed block, to component `to(unit)` of its units.
+    const auto spread = [&](std::size_t component, const auto& to) HWY_ATTR {
+      for (std::size_t vertex = 0; vertex < blockVertices; vertex += step) {
+        const std::size_t offset = component * blockVertices + vertex;
+        if constexpr (isLone) {
+          to(units + vertex / lanes) = hn::Load(d, blocks[0] + offset);
+        } else {
+          const Vec4<D> four = gatherRows(d, blocks, offset);
+          to(units + vertex) = four.x;
+          to(units + vertex + 1) = four.y;
+          to(units + vertex + 2) = four.z;
+          to(units + vertex + 3) = four.w;
+        }
       }
-      if (tangents) scatter(block.tangents[3], unit, i, &tile.tangents[unit][3]);
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      spread(c, [&](std::size_t unit) -> Vec<D>& { return tile.positions[unit][c]; });
+      if (normals)
+        spread(3 + c, [&](std::size_t unit) -> Vec<D>& { return tile.givenNormals[unit][c]; });
+      if (tangents)
+        spread(6 + c, [&](std::size_t unit) -> Vec<D>& { return tile.givenTangents[unit][c]; });
     }
+    if (tangents) spread(9, [&](std::size_t unit) -> Vec<D>& { return tile.tangents[unit][3]; });
+    units += blockVertices / unitVertices<isLone, D>;
   }
   const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   const auto unitVector = [&](const Vec<D>* given, Vec<D>* to) HWY_ATTR {
@@ -181,7 +198,7 @@ HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t fi
   from.givenNormals = first(tile.givenNormals);
   from.tangents = first(tile.tangents);
   from.givenTangents = first(tile.givenTangents);
-  from.isWhole = true;
+  from.isTile = true;
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE

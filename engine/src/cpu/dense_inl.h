@@ -1,5 +1,5 @@
-// Stores vertices that have nothing between them and consist of words: four of each instance at a
-// time, in whole blocks.
+// Stores vertices of a lone instance that have nothing between them and consist of words: four for
+// each block of a vector.
 #pragma once
 
 #include <cstddef>
@@ -28,41 +28,11 @@ DERMIS_INLINE void storeChunks(Eight d, const Vec<Eight> (&chunks)[count], float
   }
 }
 #endif
-#if HWY_MAX_BYTES >= 64
-template <std::size_t count>
-DERMIS_INLINE void storeChunks(Sixteen, const Vec<Sixteen> (&chunks)[count], float* const to[4]) {
-  const Eight half;
-  for (std::size_t k = 0; k + 1 < count; k += 2) {
-    // The even blocks of both chunks, and the odd ones.
-    const auto even = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(chunks[k + 1]), chunks[k]);
-    const auto odd = hn::OddEvenBlocks(chunks[k + 1], hn::SwapAdjacentBlocks(chunks[k]));
-    hn::StoreU(hn::LowerHalf(half, even), half, to[0] + k * 4);
-    hn::StoreU(hn::LowerHalf(half, odd), half, to[1] + k * 4);
-    hn::StoreU(hn::UpperHalf(half, even), half, to[2] + k * 4);
-    hn::StoreU(hn::UpperHalf(half, odd), half, to[3] + k * 4);
-  }
-  if constexpr (count % 2 != 0) {
-    const Four four;
-    const Vec<Eight> lower = hn::LowerHalf(half, chunks[count - 1]);
-    const Vec<Eight> upper = hn::UpperHalf(half, chunks[count - 1]);
-    hn::StoreU(hn::LowerHalf(four, lower), four, to[0] + (count - 1) * 4);
-    hn::StoreU(hn::UpperHalf(four, lower), four, to[1] + (count - 1) * 4);
-    hn::StoreU(hn::LowerHalf(four, upper), four, to[2] + (count - 1) * 4);
-    hn::StoreU(hn::UpperHalf(four, upper), four, to[3] + (count - 1) * 4);
-  }
-}
-#endif
-
-/// Whether `storeDense` can store vertices of this many words.
-inline constexpr bool isDenseSize(std::size_t words) {
-  return words == 3 || words == 5 || words == 6 || words == 10;
-}
-
 /// Stores the words of four vertices, each word in a lane of every block. Comments below show what
 /// is in a block: two words of a vertex and its number.
 template <std::size_t count, class D>
 DERMIS_INLINE void storeDense(D d, const Vec<D> (&w)[count], float* const* to) {
-  static_assert(isDenseSize(count));
+  static_assert(count == 3 || count == 5 || count == 6 || count == 10);
   using Pairs = hn::Repartition<double, D>;  // two words are moved as one
   const Pairs dd;
   const auto lower = [&](std::size_t a, std::size_t b)

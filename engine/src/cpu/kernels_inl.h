@@ -10,9 +10,6 @@
 #include <span>
 
 #include "cpu/kernels.h"
-#ifndef DERMIS_CPU_STAGES_ONLY
-#include "cpu/plain_inl.h"
-#endif
 #include "cpu/stages_inl.h"
 #include "cpu/task.h"
 #include "strict_floating_point.h"
@@ -28,6 +25,8 @@ struct SectionTask {
   std::size_t firstRun, runEnd;
   std::uint32_t firstVertex, vertexEnd;  ///< within these runs
 };
+
+inline constexpr std::uint32_t mostBlocks = ~std::uint32_t{0} / blockVertices / 2;
 
 /// The vertices of a run that a job skins.
 inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& first,
@@ -58,107 +57,67 @@ DERMIS_INLINE void forTiles(const SectionTask& part, std::uint32_t most, const S
   }
 }
 
-/// Skins instances of a group from `first` on, by all stages.
+/// Skins a company, or a lone instance.
 template <bool isLone, class D>
-inline HWY_ATTR void skinByStages(D d, const SectionTask& part, const Palette& palette,
-                                  const TaskInstance* const* instances) {
-  constexpr std::size_t count = isLone ? 1 : blocksOf<D>;
+inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Common& common,
+                                  const Palette& palette, const TaskInstance* const* instances,
+                                  std::size_t count) {
   for (std::size_t i = 0; i < count; ++i)
     part.scratch[0].morphs[i].begin(*part.task.mesh, instances[i]->morphs);
-  const Company company{part.task, instances, count, palette, part.scratch[0].morphs.data()};
+  const Together together{part.task, instances, count,
+                          common,    palette,   part.scratch[0].morphs.data()};
   Findings<D> findings(d);
   // Not on the stack: an engine's fibers may have little of it.
   auto& tile = *new (floatsOf(part.scratch[0].tile, sizeof(Tile<D>) / sizeof(float))) Tile<D>;
-  forTiles(part, isLone ? Tile<D>::most : Tile<D>::most / 2,
-           [&](const Blocks& blocks, const VertexRange& range)
-               HWY_ATTR { skinTile<isLone>(d, company, blocks, range, tile, findings); });
+  constexpr std::size_t most = (isLone ? Tile<D>::mostLone : Tile<D>::most) / unitsOf<isLone, D>;
+  forTiles(part, common.isDirect ? mostBlocks : most,
+           [&](const Blocks& blocks, const VertexRange& range) HWY_ATTR {
+             common.isDirect ? skinDirectly<isLone>(d, together, blocks, range, tile, findings)
+                             : skinTile<isLone>(d, together, blocks, range, tile, findings);
+           });
   for (std::size_t i = 0; i < count; ++i) {
     if (instances[i]->result == nullptr) continue;
-    addFindings(d, findings, i * 4, isLone ? hn::MaxLanes(d) : i * 4 + 4, findings.clamped[i],
+    addFindings(d, findings, i, isLone ? hn::MaxLanes(d) : i + 1, findings.clamped[i],
                 *instances[i]->result);
   }
 }
 
-#ifndef DERMIS_CPU_STAGES_ONLY
-
-/// How plain_inl.h can skin these instances, if it can.
-inline PlainVertex plainVertexOf(const Task& task, const TaskInstance* const* instances,
-                                 std::size_t count) {
-  if (task.method != Method::dualQuaternion && task.method != Method::linear)
-    return PlainVertex::none;
-  const auto isPlain = [](const TaskInstance* instance) {
-    return instance->morphs.empty() && instance->result == nullptr;
-  };
-  if (task.places.hasMotion() || !std::all_of(instances, instances + count, isPlain))
-    return PlainVertex::none;
-  return plainVertexOf(task.places, instances, count);
-}
-
-/// Skins the vertices of a job, whole blocks in place and others beside the output.
-template <PlainVertex vertex, class D>
-inline HWY_ATTR void skinPlainly(D d, const SectionTask& part, const Palette& palette,
-                                 const TaskInstance* const* instances) {
-  float* outputs[blocksOf<D>];
-  for (std::size_t i = 0; i < blocksOf<D>; ++i)
-    outputs[i] = reinterpret_cast<float*>(instances[i]->outputs[Stream::positions]);
-  const auto skin = [&](const PlainTask& task, float* const* to) HWY_ATTR {
-    byInfluences(task.run.influences, [&](auto influences) HWY_ATTR {
-      if (part.task.method == Method::linear) {
-        skinInstances<PlainKind::moved, vertex, influences()>(d, task, palette, to);
-      } else if (palette.scales) {
-        skinInstances<PlainKind::scaled, vertex, influences()>(d, task, palette, to);
-      } else {
-        skinInstances<PlainKind::turned, vertex, influences()>(d, task, palette, to);
-      }
-    });
-  };
-  forTiles(part, ~std::uint32_t{0} / blockVertices / 2,
-           [&](const Blocks& blocks, const VertexRange& range)
-               HWY_ATTR { skinBlocks<vertex, D>(*part.task.mesh, blocks, range, outputs, skin); });
-}
-
-#endif  // DERMIS_CPU_STAGES_ONLY
-
-template <bool isLone, class D>
-inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Group& group,
-                                  std::size_t first, bool isModerate) {
-  const TaskInstance* const* const instances = group.instances + first;
-  Palette palette = makePalette<isLone>(d, *part.task.mesh, part.section, part.task.method, group,
-                                        first, part.scratch[0]);
-  palette.isModerate = isModerate;
-#ifndef DERMIS_CPU_STAGES_ONLY
-  if constexpr (!isLone) {
-    switch (isModerate ? plainVertexOf(part.task, instances, blocksOf<D>) : PlainVertex::none) {
-      case PlainVertex::normals:
-        return skinPlainly<PlainVertex::normals>(d, part, palette, instances);
-      case PlainVertex::tangents:
-        return skinPlainly<PlainVertex::tangents>(d, part, palette, instances);
-      case PlainVertex::none:
-        break;
-    }
+/// Skins instances of a group from `first` on as companies of as many as D has lanes, while enough
+/// are left. Returns the number of the next one.
+template <class D>
+inline HWY_ATTR std::size_t skinCompanies(D d, const SectionTask& part, const Group& group,
+                                          std::size_t first, bool isModerate) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  while ((group.count - first) * 4 >= lanes * 3) {
+    const Members<D> members(group, first, std::min(lanes, group.count - first));
+    const Common common(part.task, members.instances, members.count, lanes);
+    // Sixteen would begin too many cache lines at a time, and wait for them.
+    const bool isShort = !group.scales && (part.task.method == Method::linear ||
+                                           part.task.method == Method::dualQuaternion);
+    if (lanes > 8 && common.isDirect && isShort) break;
+    Palette palette = makePalette(d, *part.task.mesh, part.section, part.task.method, group,
+                                  members, part.scratch[0]);
+    palette.isModerate = isModerate;
+    skinTogether<false>(d, part, common, palette, members.instances, members.count);
+    first += members.count;
   }
-#endif
-  skinByStages<isLone>(d, part, palette, instances);
+  return first;
 }
 
 /// Skins all instances of the group, then empties it.
 inline HWY_ATTR void skinGroup(const SectionTask& part, Group& group, bool isModerate) {
   std::size_t first = 0;
 #if HWY_MAX_BYTES >= 64
-  if (group.count == 4) {
-    skinTogether<false>(Sixteen(), part, group, 0, isModerate);
-    first = 4;
-  }
+  first = skinCompanies(Sixteen(), part, group, first, isModerate);
 #endif
-#if HWY_MAX_BYTES >= 32
-  if (group.count - first >= 2) {
-    skinTogether<false>(Eight(), part, group, first, isModerate);
-    first += 2;
+  first = skinCompanies(Wide(), part, group, first, isModerate);
+  for (; first != group.count; ++first) {
+    const TaskInstance* const* const instance = group.instances + first;
+    Palette palette =
+        makePalette(*part.task.mesh, part.section, part.task.method, group, first, part.scratch[0]);
+    palette.isModerate = isModerate;
+    skinTogether<true>(Wide(), part, Common(part.task, instance, 1, 1), palette, instance, 1);
   }
-  if (first != group.count) skinTogether<true>(Eight(), part, group, first, isModerate);
-#else
-  if (first != group.count) skinTogether<false>(Four(), part, group, first, isModerate);
-#endif
   group.count = 0;
 }
 

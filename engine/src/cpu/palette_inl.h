@@ -8,17 +8,14 @@
 
 #include "cpu/pose_inl.h"
 #include "cpu/task.h"
+#include "cpu/vertex_inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
 
-/// Maximum number of instances skinned at a time: one for each 128 bits of a vector.
-inline constexpr std::size_t mostInstances = HWY_MAX_BYTES >= 64 ? 4 : HWY_MAX_BYTES >= 32 ? 2 : 1;
-
-/// A vector has a block of 128 bits for each of several instances, or holds eight vertices of a
-/// *lone* one.
-template <class D>
-inline constexpr std::size_t blocksOf = hn::MaxLanes(D()) / 4;
+/// Maximum number of instances skinned at a time: a *company*, with one of them in each lane. If
+/// there are too few, the vertices of a *lone* instance are in the lanes.
+inline constexpr std::size_t mostInstances = HWY_MAX_BYTES >= 64 ? 16 : HWY_MAX_BYTES >= 32 ? 8 : 4;
 
 inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
   const std::size_t lines = (count + std::size(CacheLine().v) - 1) / std::size(CacheLine().v);
@@ -29,7 +26,7 @@ inline float* floatsOf(std::vector<CacheLine>& memory, std::size_t count) {
   return numbersOf(memory.data());
 }
 
-inline bool needsRows(Method method) {
+constexpr bool needsRows(Method method) {
   return method == Method::linear || method == Method::blended || needsCentersOfRotation(method);
 }
 
@@ -71,99 +68,222 @@ inline DualQuaternionArray<const T> readOnly(const DualQuaternionArray<T>& array
   return {array.first, array.stride, array.dual};
 }
 
-/// Entries of four floats. Those of all instances are side by side: entry `number` begins at
-/// `number` / 8 × `stride`. Entries of a lone instance of eight lanes have the next quads of the
-/// same joint or pair beside them.
+/// Entries of eight numbers, those of `rows` of sixteen: floats of a lone instance, or vectors of a
+/// company, with an instance in each lane. Influences have the numbers of entries times eight.
 struct Palette {
-  const float* pairs[2] = {};      ///< dual quaternions: real and dual part
-  const float* partPairs[2] = {};  ///< scale/shear parts of pairs: the joint's minus the pivot's
-  const float* parts[2] = {};      ///< scale/shear parts of joints
-  const float* rows[3] = {};       ///< of the matrices of joints
+  const float* pairs = nullptr;      ///< dual quaternions: real and dual part
+  const float* partPairs = nullptr;  ///< scale/shear parts of pairs: the joint's minus the pivot's
+  const float* parts = nullptr;      ///< scale/shear parts of joints
+  const float* rows = nullptr;       ///< of the matrices of joints, and four unused numbers
   bool scales = false;
   bool isModerate = false;  ///< result of `areModerate`, for directions
 };
 
-/// Writes the rows of R S | t of a decomposed joint, `apart` floats apart.
-inline void writeRows(const float* q, const float* low, const float* high,
-                      const JointMatrix& matrix, float* to, std::size_t apart) {
-  const float x = q[0], y = q[1], z = q[2], w = q[3];
-  const float r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                         {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                         {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
-  for (std::size_t row = 0; row < 3; ++row) {
-    float* const out = to + row * apart;
-    if (low == nullptr) {
-      std::memcpy(out, r[row], sizeof(r[row]));
-    } else {
-      const float a = r[row][0], b = r[row][1], c = r[row][2];
-      out[0] = low[0] * a + low[3] * b + high[0] * c;
-      out[1] = low[3] * a + low[1] * b + high[1] * c;
-      out[2] = high[0] * a + high[1] * b + low[2] * c;
-    }
-    out[3] = matrix.m[row][3];
-  }
+/// R of a unit quaternion, with a translation.
+template <class D>
+DERMIS_INLINE Matrix<D> rotationRows(D d, const Vec4<D>& q, const Vec3<D>& t) {
+  const Vec<D> one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f);
+  const auto diagonal = [&](Vec<D> a, Vec<D> b) HWY_ATTR {
+    return hn::Sub(one, hn::Mul(two, hn::Add(hn::Mul(a, a), hn::Mul(b, b))));
+  };
+  const auto sum = [&](Vec<D> a, Vec<D> b, Vec<D> c)
+                       HWY_ATTR { return hn::Mul(two, hn::Add(hn::Mul(a, b), hn::Mul(q.w, c))); };
+  const auto difference = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+    return hn::Mul(two, hn::Sub(hn::Mul(a, b), hn::Mul(q.w, c)));
+  };
+  return {{diagonal(q.y, q.z), difference(q.x, q.y, q.z), sum(q.x, q.z, q.y), t.x},
+          {sum(q.x, q.y, q.z), diagonal(q.x, q.z), difference(q.y, q.z, q.x), t.y},
+          {difference(q.x, q.z, q.y), sum(q.y, q.z, q.x), diagonal(q.x, q.y), t.z}};
 }
 
-/// The palette of `blocksOf<D>` instances of a group from `first` on, or of the one at `first`.
-template <bool isLone, class D>
-inline HWY_ATTR Palette makePalette(D, const MeshData& mesh, const Section& section, Method method,
-                                    const Group& group, std::size_t first, Scratch& scratch) {
-  constexpr std::size_t instances = isLone ? 1 : blocksOf<D>;
-  using Lanes = std::conditional_t<isLone, Four, D>;
-  const Lanes d;
+/// A row of R S: `row` of R, with a scale/shear part by its two quads.
+template <class D>
+DERMIS_INLINE Vec4<D> scaleRow(const Vec4<D>& row, const Vec4<D>& low, const Vec4<D>& high) {
+  return {dot3(low.x, low.w, high.x, row.x, row.y, row.z),
+          dot3(low.w, low.y, high.y, row.x, row.y, row.z),
+          dot3(high.x, high.y, low.z, row.x, row.y, row.z), row.w};
+}
+
+/// The palette of the instance at `lone` of a group.
+inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section, Method method,
+                                    const Group& group, std::size_t lone, Scratch& scratch) {
+  const Four d;
   const std::span<const std::uint32_t> joints = jointsOf(mesh, section);
   const std::span<const Pair> pairs = pairsOf(mesh, section);
-  // Floats from an entry to the next, and from the first quad of an entry to the second.
-  const std::size_t stride = isLone ? 8 : instances * 4;
-  const auto second = [&](std::size_t count) { return isLone ? 4 : count * stride; };
   Palette palette;
   palette.scales = group.scales;
   if (method != Method::linear) {
-    float* const to = floatsOf(scratch.pairs, pairs.size() * 8 * instances);
-    const std::size_t dual = second(pairs.size());
-    convertPairs(d, pairs, readOnly(group.jointsOf(first)), {to, stride, dual});
-    palette.pairs[0] = to;
-    palette.pairs[1] = to + dual;
+    float* const to = floatsOf(scratch.pairs, pairs.size() * 8);
+    convertPairs(pairs, readOnly(group.jointsOf(lone)), to);
+    palette.pairs = to;
   }
+  const DualQuaternionArray<float> own = group.jointsOf(lone), parts = group.partsOf(lone);
   if (palette.scales) {
-    float* const differences =
-        floatsOf(scratch.scalePairs, (pairs.size() + joints.size()) * 8 * instances);
-    const std::size_t dual = second(pairs.size());
-    subtractPivots(d, pairs, readOnly(group.partsOf(first)), {differences, stride, dual});
-    palette.partPairs[0] = differences;
-    palette.partPairs[1] = differences + dual;
-    float* const parts = differences + pairs.size() * 8 * instances;
+    float* const differences = floatsOf(scratch.scalePairs, (pairs.size() + joints.size()) * 8);
+    subtractPivots(pairs, readOnly(parts), differences);
+    palette.partPairs = differences;
+    float* const to = differences + pairs.size() * 8;
     for (std::size_t joint = 0; joint < joints.size(); ++joint) {
-      const float* const from = group.partsOf(first).first + joint * group.parts.stride;
-      hn::Store(hn::LoadU(d, from), d, parts + joint * stride);
-      hn::Store(hn::LoadU(d, from + group.parts.dual), d,
-                parts + second(joints.size()) + joint * stride);
+      const float* const from = parts.first + joint * parts.stride;
+      hn::Store(hn::LoadU(d, from), d, to + joint * 8);
+      hn::Store(hn::LoadU(d, from + parts.dual), d, to + joint * 8 + 4);
     }
-    palette.parts[0] = parts;
-    palette.parts[1] = parts + second(joints.size());
+    palette.parts = to;
   }
   if (!needsRows(method)) return palette;
-  float* const rows = floatsOf(scratch.rows, joints.size() * 16 * instances);
-  const std::size_t apart = isLone ? 4 : joints.size() * stride;
-  for (std::size_t i = 0; i < instances; ++i) {
-    const TaskInstance& instance = *group.instances[first + i];
-    const DualQuaternionArray<float> own = group.jointsOf(first + i),
-                                     parts = group.partsOf(first + i);
-    for (std::size_t joint = 0; joint < joints.size(); ++joint) {
-      const JointMatrix& matrix =
-          joints[joint] == stillJoint ? stillMatrix : instance.pose[joints[joint]];
-      float* const to = rows + (isLone ? joint * 16 : joint * stride + i * 4);
-      if (method == Method::linear) {
-        for (std::size_t row = 0; row < 3; ++row)
-          std::memcpy(to + row * apart, matrix.m[row], sizeof(matrix.m[row]));
-      } else {
-        const float* const low = parts.first + joint * parts.stride;
-        writeRows(own.first + joint * own.stride, palette.scales ? low : nullptr, low + parts.dual,
-                  matrix, to, apart);
-      }
+  float* const rows = floatsOf(scratch.rows, joints.size() * 16);
+  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+    const JointMatrix& matrix =
+        joints[joint] == stillJoint ? stillMatrix : group.instances[lone]->pose[joints[joint]];
+    float* const to = rows + joint * 16;
+    if (method == Method::linear) {
+      std::memcpy(to, matrix.m, sizeof(matrix.m));
+      continue;
+    }
+    using One = hn::FixedTag<float, 1>;
+    const One one;
+    const auto quad = [&](const float* v) HWY_ATTR {
+      return Vec4<One>{hn::Set(one, v[0]), hn::Set(one, v[1]), hn::Set(one, v[2]),
+                       hn::Set(one, v[3])};
+    };
+    const Matrix<One> turned = rotationRows(
+        one, quad(own.first + joint * own.stride),
+        {hn::Set(one, matrix.m[0][3]), hn::Set(one, matrix.m[1][3]), hn::Set(one, matrix.m[2][3])});
+    const float* const low = parts.first + joint * parts.stride;
+    float* next = to;
+    for (Vec4<One> row : {turned.r0, turned.r1, turned.r2}) {
+      if (palette.scales) row = scaleRow(row, quad(low), quad(low + parts.dual));
+      for (const Vec<One> value : {row.x, row.y, row.z, row.w}) *next++ = hn::GetLane(value);
     }
   }
-  for (std::size_t row = 0; row < 3; ++row) palette.rows[row] = rows + row * apart;
+  palette.rows = rows;
+  return palette;
+}
+
+// -- The palette of a company.
+
+/// Four vectors side by side.
+template <class D>
+DERMIS_INLINE Vec4<D> loadQuad(D d, const float* from) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  return {hn::Load(d, from), hn::Load(d, from + lanes), hn::Load(d, from + 2 * lanes),
+          hn::Load(d, from + 3 * lanes)};
+}
+template <class D>
+DERMIS_INLINE void setQuad(D d, const Vec4<D>& quad, float* to) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  hn::Store(quad.x, d, to);
+  hn::Store(quad.y, d, to + lanes);
+  hn::Store(quad.z, d, to + 2 * lanes);
+  hn::Store(quad.w, d, to + 3 * lanes);
+}
+
+/// Instances of a group from `first` on, one for each lane. Lanes without an instance repeat the
+/// last one.
+template <class D>
+struct Members {
+  static constexpr std::size_t most = hn::MaxLanes(D());
+
+  const TaskInstance* instances[most];
+  std::size_t count;  ///< without repetitions
+  const float *joints[most], *parts[most], *poses[most];
+
+  Members(const Group& group, std::size_t first, std::size_t number) : count(number) {
+    for (std::size_t lane = 0; lane < most; ++lane) {
+      const std::size_t member = first + std::min(lane, number - 1);
+      instances[lane] = group.instances[member];
+      joints[lane] = group.jointsOf(member).first;
+      parts[lane] = group.partsOf(member).first;
+      poses[lane] = numbersOf(instances[lane]->pose.data());
+    }
+  }
+};
+
+/// The entries of all joints.
+template <class D>
+inline HWY_ATTR void spreadJoints(D d, const float* const* from,
+                                  const DualQuaternionArray<float>& array, std::size_t count,
+                                  float* to) {
+  constexpr std::size_t quad = 4 * hn::MaxLanes(d);
+  for (std::size_t joint = 0; joint < count; ++joint) {
+    setQuad(d, gatherRows(d, from, joint * array.stride), to);
+    setQuad(d, gatherRows(d, from, joint * array.stride + array.dual), to + quad);
+    to += 2 * quad;
+  }
+}
+
+template <class D>
+inline HWY_ATTR Palette makePalette(D d, const MeshData& mesh, const Section& section,
+                                    Method method, const Group& group, const Members<D>& members,
+                                    Scratch& scratch) {
+  constexpr std::size_t quad = 4 * hn::MaxLanes(d), entry = 2 * quad;
+  const std::span<const std::uint32_t> joints = jointsOf(mesh, section);
+  const std::span<const Pair> pairs = pairsOf(mesh, section);
+  Palette palette;
+  palette.scales = group.scales;
+  float* own = nullptr;
+  if (method != Method::linear) {
+    own = floatsOf(scratch.companyJoints, joints.size() * entry);
+    spreadJoints(d, members.joints, group.joints, joints.size(), own);
+    float* to = floatsOf(scratch.pairs, pairs.size() * entry);
+    palette.pairs = to;
+    for (const Pair& pair : pairs) {
+      const Vec4<D> pivot = loadQuad(d, own + pair.pivot * entry);
+      const float* const joint = own + pair.joint * entry;
+      const Vec4<D> real = loadQuad(d, joint), dual = loadQuad(d, joint + quad);
+      const Vec<D> product = hn::Add(hn::Add(hn::Mul(pivot.x, real.x), hn::Mul(pivot.y, real.y)),
+                                     hn::Add(hn::Mul(pivot.z, real.z), hn::Mul(pivot.w, real.w)));
+      const Vec<D> flip = hn::And(product, hn::SignBit(d));
+      const auto flipped = [&](const Vec4<D>& q) HWY_ATTR {
+        return Vec4<D>{hn::Xor(q.x, flip), hn::Xor(q.y, flip), hn::Xor(q.z, flip),
+                       hn::Xor(q.w, flip)};
+      };
+      setQuad(d, flipped(real), to);
+      setQuad(d, flipped(dual), to + quad);
+      to += entry;
+    }
+  }
+  float* parts = nullptr;
+  if (palette.scales) {
+    float* to = floatsOf(scratch.scalePairs, (pairs.size() + joints.size()) * entry);
+    parts = to + pairs.size() * entry;
+    palette.partPairs = to;
+    palette.parts = parts;
+    spreadJoints(d, members.parts, group.parts, joints.size(), parts);
+    for (const Pair& pair : pairs) {
+      const float *const joint = parts + pair.joint * entry, *const pivot =
+                                                                 parts + pair.pivot * entry;
+      for (std::size_t i = 0; i < entry; i += hn::MaxLanes(d))
+        hn::Store(hn::Sub(hn::Load(d, joint + i), hn::Load(d, pivot + i)), d, to + i);
+      to += entry;
+    }
+  }
+  if (!needsRows(method)) return palette;
+  float* const rows = floatsOf(scratch.rows, joints.size() * 2 * entry);
+  palette.rows = rows;
+  const float* still[Members<D>::most];
+  std::fill_n(still, Members<D>::most, numbersOf(&stillMatrix));
+  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+    const bool isStill = joints[joint] == stillJoint;
+    const float* const* const from = isStill ? still : members.poses;
+    const std::size_t offset = isStill ? 0 : joints[joint] * std::size_t{12};
+    Matrix<D> matrix{gatherRows(d, from, offset), gatherRows(d, from, offset + 4),
+                     gatherRows(d, from, offset + 8)};
+    if (method != Method::linear) {
+      matrix = rotationRows(d, loadQuad(d, own + joint * entry),
+                            {matrix.r0.w, matrix.r1.w, matrix.r2.w});
+      if (palette.scales) {
+        const Vec4<D> low = loadQuad(d, parts + joint * entry),
+                      high = loadQuad(d, parts + joint * entry + quad);
+        matrix = {scaleRow(matrix.r0, low, high), scaleRow(matrix.r1, low, high),
+                  scaleRow(matrix.r2, low, high)};
+      }
+    }
+    float* const to = rows + joint * 2 * entry;
+    setQuad(d, matrix.r0, to);
+    setQuad(d, matrix.r1, to + quad);
+    setQuad(d, matrix.r2, to + 2 * quad);
+  }
   return palette;
 }
 

@@ -206,43 +206,37 @@ inline HWY_ATTR bool convertJoints(const PoseTask& task) {
   return scales;
 }
 
-/// Writes a dual quaternion for each pair, in the hemisphere of its pivot, for as many instances as
-/// D has blocks. The values of these instances are adjacent.
-template <class D>
-DERMIS_INLINE void convertPairs(D d, std::span<const Pair> pairs,
-                                const DualQuaternionArray<const float>& joints,
-                                const DualQuaternionArray<float>& to) {
-  const hn::Repartition<double, D> dd;
-  const auto sign = hn::SignBit(d);
-  float* place = to.first;
+/// Writes a dual quaternion for each pair, in the hemisphere of its pivot: eight floats each.
+inline HWY_ATTR void convertPairs(std::span<const Pair> pairs,
+                                  const DualQuaternionArray<const float>& joints, float* to) {
+  const Four d;
+  const hn::Repartition<double, Four> dd;
   for (const Pair& pair : pairs) {
     const float* const joint = joints.first + std::size_t{pair.joint} * joints.stride;
-    const Vec<D> pivot = hn::LoadU(d, joints.first + std::size_t{pair.pivot} * joints.stride);
-    const Vec<D> real = hn::LoadU(d, joint);
-    const Vec<D> dual = hn::LoadU(d, joint + joints.dual);
-    Vec<D> sum = hn::Mul(pivot, real);
+    const Vec<Four> pivot = hn::LoadU(d, joints.first + std::size_t{pair.pivot} * joints.stride);
+    const Vec<Four> real = hn::LoadU(d, joint);
+    const Vec<Four> dual = hn::LoadU(d, joint + joints.dual);
+    Vec<Four> sum = hn::Mul(pivot, real);
     sum = hn::Add(sum, hn::Reverse2(d, sum));
     sum = hn::Add(sum, hn::BitCast(d, hn::Reverse2(dd, hn::BitCast(dd, sum))));
-    const auto flip = hn::And(sum, sign);
-    hn::Store(hn::Xor(real, flip), d, place);
-    hn::Store(hn::Xor(dual, flip), d, place + to.dual);
-    place += to.stride;
+    const auto flip = hn::And(sum, hn::SignBit(d));
+    hn::Store(hn::Xor(real, flip), d, to);
+    hn::Store(hn::Xor(dual, flip), d, to + 4);
+    to += 8;
   }
 }
 
-/// Writes the joint's scale/shear part minus the pivot's, for each pair.
-template <class D>
-DERMIS_INLINE void subtractPivots(D d, std::span<const Pair> pairs,
-                                  const DualQuaternionArray<const float>& parts,
-                                  const DualQuaternionArray<float>& to) {
-  float* place = to.first;
+/// Writes the joint's scale/shear part minus the pivot's, for each pair: eight floats each.
+inline HWY_ATTR void subtractPivots(std::span<const Pair> pairs,
+                                    const DualQuaternionArray<const float>& parts, float* to) {
+  const Four d;
   for (const Pair& pair : pairs) {
     const float* const joint = parts.first + std::size_t{pair.joint} * parts.stride;
     const float* const pivot = parts.first + std::size_t{pair.pivot} * parts.stride;
-    hn::Store(hn::Sub(hn::LoadU(d, joint), hn::LoadU(d, pivot)), d, place);
-    hn::Store(hn::Sub(hn::LoadU(d, joint + parts.dual), hn::LoadU(d, pivot + parts.dual)), d,
-              place + to.dual);
-    place += to.stride;
+    for (const std::size_t quad : {std::size_t{0}, parts.dual}) {
+      hn::Store(hn::Sub(hn::LoadU(d, joint + quad), hn::LoadU(d, pivot + quad)), d, to);
+      to += 4;
+    }
   }
 }
 

@@ -11,11 +11,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
 
-/// The bounds, and the numbers of clamped vertices, of the instances in the blocks of a vector.
+/// The bounds, and the numbers of clamped vertices, of a company or a lone instance.
 template <class D>
 struct Findings {
   Vec<D> least[3], greatest[3];
-  std::uint32_t clamped[blocksOf<D>] = {};
+  std::uint32_t clamped[hn::MaxLanes(D())] = {};
 
   explicit Findings(D d) {
     for (Vec<D>& value : least) value = hn::Set(d, std::numeric_limits<float>::infinity());
@@ -44,7 +44,7 @@ HWY_NOINLINE HWY_ATTR void findBounds(D d, const Tile<D>& tile, std::size_t unit
   }
 }
 
-/// Adds what was found of the instance in lanes `first` to `end`.
+/// Adds what was found of the instance in lanes `first` to `end` of all.
 template <class D>
 inline HWY_ATTR void addFindings(D d, const Findings<D>& findings, std::size_t first,
                                  std::size_t end, std::uint32_t clamped, InstanceResult& result) {
@@ -75,7 +75,7 @@ HWY_NOINLINE HWY_ATTR void relateToBoxes(D d, const TaskInstance* const* instanc
   constexpr std::size_t lanes = hn::MaxLanes(d);
   HWY_ALIGN float centers[3][lanes], inverses[3][lanes], counts[lanes];
   for (std::size_t lane = 0; lane < lanes; ++lane) {
-    const TaskInstance& instance = *instances[isLone ? 0 : lane / 4];
+    const TaskInstance& instance = *instances[isLone ? 0 : lane];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       centers[axis][lane] = instance.boxCenter[axis];
       inverses[axis][lane] = instance.boxInverse[axis];
@@ -93,7 +93,7 @@ HWY_NOINLINE HWY_ATTR void relateToBoxes(D d, const TaskInstance* const* instanc
     isOutside = hn::And(isOutside, lanesInRange<isLone>(d, range, unit));
     hn::Store(hn::IfThenElseZero(isOutside, hn::Set(d, 1.0f)), d, counts);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      if (counts[lane] != 0) ++findings.clamped[isLone ? 0 : lane / 4];
+      if (counts[lane] != 0) ++findings.clamped[isLone ? 0 : lane];
     }
   }
 }

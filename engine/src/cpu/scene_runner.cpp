@@ -32,7 +32,7 @@ namespace {
 
 constexpr std::uint32_t noResult = 0xffffffff;
 /// Instances that the widest vectors skin at a time.
-constexpr std::uint64_t instancesTogether = 4;
+constexpr std::uint64_t instancesTogether = 16;
 
 /// The largest size of an object, a multiple of 64. Buffers are smaller, so that their sizes fit
 /// `std::size_t` on 32-bit systems too.

@@ -4,7 +4,7 @@
 #include "hwy/highway.h"
 
 // Where vectors are plain arrays, inlining everything costs a minute of compile time.
-#ifdef DERMIS_CPU_STAGES_ONLY
+#ifdef DERMIS_CPU_SMALL
 #define DERMIS_INLINE inline
 #else
 #define DERMIS_INLINE HWY_INLINE
@@ -89,20 +89,25 @@ DERMIS_INLINE Vec<D> powerScale(D d, Vec<D> largest) {
   return hn::BitCast(d, hn::ShiftLeft<23>(scaled));
 }
 
-/// `v` normalized, whatever its magnitude, or `fallback` if its length is 0. A lane is scaled only
-/// if its square needs it, whatever the other lanes need: scaling may round a tiny component.
+/// `v` normalized, whatever its magnitude, times `side`, 1 or -1; or `fallback` if its length is 0.
+/// A lane is scaled only if its square needs it, whatever the other lanes need: scaling may round a
+/// tiny component.
 template <class D>
-DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
+DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback, Vec<D> side) {
   const Vec<D> one = hn::Set(d, 1.0f);
   const Vec<D> given = dot3(v, v);
   const auto isModerate =
       hn::And(hn::Ge(given, hn::Set(d, 0x1p-60f)), hn::Le(given, hn::Set(d, 0x1p60f)));
-  if (HWY_LIKELY(hn::AllTrue(d, isModerate))) return scale3(v, hn::Div(one, hn::Sqrt(given)));
+  if (HWY_LIKELY(hn::AllTrue(d, isModerate))) return scale3(v, hn::Div(side, hn::Sqrt(given)));
   const Vec<D> factor = hn::IfThenElse(isModerate, one, powerScale(d, largest3(v)));
   const Vec3<D> scaled = scale3(v, factor);
   const Vec<D> square = dot3(scaled, scaled);
-  const Vec<D> inverse = hn::Div(one, hn::Sqrt(square));
+  const Vec<D> inverse = hn::Div(side, hn::Sqrt(square));
   return choose3(hn::Eq(square, hn::Zero(d)), fallback, scale3(scaled, inverse));
+}
+template <class D>
+DERMIS_INLINE Vec3<D> unitOr(D d, const Vec3<D>& v, const Vec3<D>& fallback) {
+  return unitOr(d, v, fallback, hn::Set(d, 1.0f));
 }
 
 /// The sign of `value` as 1 or -1; the sign of -0 is 1.

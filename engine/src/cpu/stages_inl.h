@@ -1,10 +1,10 @@
-// All stages. A few vertices of several instances, or of a lone one, pass through all of them at a
+// All stages. A few vertices of a company, or of a lone instance, pass through all of them at a
 // time, so that what one hands to the next stays in the nearest cache. Every method, format and
-// option is made of them. plain_inl.h joins them for the common case, with the same operations in
-// the same order.
+// option is made of them.
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <type_traits>
 
 #include "cpu/bind_inl.h"
@@ -23,138 +23,228 @@ struct Blocks {
   std::uint32_t first, end;
 };
 
-/// The instances of a vector, and what is the same for all tiles.
-struct Company {
+/// What instances that are skinned together have in common.
+struct Common {
+  Records records;
+  bool isMorphed, hasResults;
+  /// Whether vertices are stored as they are skinned, in whole blocks: there is no other stage.
+  bool isDirect;
+
+  /// `lanes`: of a company, or 1.
+  Common(const Task& task, const TaskInstance* const* instances, std::size_t count,
+         std::size_t lanes)
+      : records(recordsOf(task.places, instances, count, lanes)),
+        isMorphed(!instances[0]->morphs.empty()),
+        hasResults(
+            std::any_of(instances, instances + count,
+                        [](const TaskInstance* instance) { return instance->result != nullptr; })),
+        isDirect(!isMorphed && !hasResults && task.places.hasMotion() == records.keepsPositions) {
+    for (const Stream stream : {Stream::positions, Stream::normals, Stream::tangents})
+      isDirect = isDirect && !isEncoded(stream, task.places[stream].format);
+    for (const Record& record : std::span(records.all).first(records.count)) {
+      isDirect = isDirect && record.isDense && (lanes > 1 || byDenseSize(record, [](auto) {}));
+    }
+  }
+};
+
+/// The instances that are skinned together, and what is the same for all tiles.
+struct Together {
   const Task& task;
-  const TaskInstance* const* instances;
-  std::size_t count;
+  const TaskInstance* const* instances;  ///< of each lane, or the lone one
+  std::size_t count;                     ///< without repetitions
+  const Common& common;
   const Palette& palette;
   ActiveTargets* morphs;  ///< of each instance
-  Records records = recordsOf(task.places, instances, count);
-  bool isMorphed = !instances[0]->morphs.empty();
-  bool hasResults = std::any_of(instances, instances + count, [](const TaskInstance* instance) {
-    return instance->result != nullptr;
-  });
 };
 
 /// Fetches what `storeTile` writes last: stores would wait for it. Always inlined: GCC removes
 /// calls of a function that only prefetches.
-HWY_INLINE HWY_ATTR void fetchOutput(const Company& company, std::size_t vertex,
+HWY_INLINE HWY_ATTR void fetchOutput(const Together& together, std::size_t vertex,
                                      const VertexRange& range) {
-  for (std::size_t number = 0; number < company.records.count; ++number) {
-    const Stream stream = company.records.all[number].stream;
-    const std::size_t stride = company.task.places[stream].stride;
+  for (std::size_t number = 0; number < together.common.records.count; ++number) {
+    const Stream stream = together.common.records.all[number].stream;
+    const std::size_t stride = together.task.places[stream].stride;
     const std::size_t step = std::max<std::size_t>(stride, 64);
-    for (std::size_t i = 0; i < company.count; ++i) {
-      const std::byte* const place = company.instances[i]->outputs[stream] + vertex * stride;
+    for (std::size_t i = 0; i < together.count; ++i) {
+      const std::byte* const place = together.instances[i]->outputs[stream] + vertex * stride;
       for (std::size_t byte = range.first * stride; byte < range.end * stride; byte += step)
         hwy::Prefetch(place + byte);
     }
   }
 }
 
-/// Blends what the method needs.
-template <bool isLone, class D>
-inline HWY_ATTR void blendTile(D d, Method method, const Palette& palette, const Slots& slots,
-                               std::size_t units, Tile<D>& tile) {
-  if (method == Method::centerOfRotation) {
-    sumUnits<isLone, 1, false>(d, palette.pairs, nullptr, slots.pairs, slots, units,
-                               tile.dualQuaternions);
-  } else if (method != Method::linear) {
-    sumUnits<isLone, 2, false>(d, palette.pairs, nullptr, slots.pairs, slots, units,
-                               tile.dualQuaternions);
+/// Calls `skin` with the method, and with whether there are scale/shear parts and tangents.
+template <class Skin>
+DERMIS_INLINE void byMethod(const Task& task, bool hasParts, const Skin& skin) {
+  const auto byTangents = [&](auto method, auto scales) HWY_ATTR {
+    if (task.places[Stream::tangents].format != VertexFormat::none)
+      return skin(method, scales, std::true_type());
+    skin(method, scales, std::false_type());
+  };
+  const auto byScale = [&](auto method) HWY_ATTR {
+    hasParts ? byTangents(method, std::true_type()) : byTangents(method, std::false_type());
+  };
+  switch (task.method) {
+    case Method::linear:
+      return byTangents(std::integral_constant<Method, Method::linear>(), std::false_type());
+    case Method::blended:
+      return byScale(std::integral_constant<Method, Method::blended>());
+    case Method::centerOfRotation:
+      return byScale(std::integral_constant<Method, Method::centerOfRotation>());
+    case Method::bulgeControlled:
+      return byScale(std::integral_constant<Method, Method::bulgeControlled>());
+    default:  // others have been refused
+      return byScale(std::integral_constant<Method, Method::dualQuaternion>());
   }
-  if (palette.scales) {
-    sumUnits<isLone, 2, true>(d, palette.partPairs, palette.parts, slots.pairs, slots, units,
-                              tile.parts);
-  }
-  if (needsRows(method))
-    sumUnits<isLone, 3, false>(d, palette.rows, nullptr, slots.joints, slots, units, tile.rows);
 }
 
-/// Chooses among the versions of `skinUnits`.
+/// How units are read from the mesh. If there are eight lanes, its blocks are as units of the tile.
 template <bool isLone, class D>
-inline HWY_ATTR void skinByMethod(D d, const Task& task, const Palette& palette, const Source& from,
-                                  std::size_t units, Tile<D>& tile) {
-  const Method method = task.method;
-  const bool normals = task.places[Stream::normals].format != VertexFormat::none;
-  const bool tangents = task.places[Stream::tangents].format != VertexFormat::none;
-  const auto skin = [&](auto formula, auto scales, auto withTangents) HWY_ATTR {
-    if (isLone || from.isWhole) {
-      skinUnits<formula(), scales(), withTangents(), true, isLone>(d, method, palette.isModerate,
-                                                                   from, normals, units, tile);
-    } else {
-      skinUnits<formula(), scales(), withTangents(), false, isLone>(d, method, palette.isModerate,
-                                                                    from, normals, units, tile);
-    }
-  };
-  const auto byTangents = [&](auto formula, auto scales) HWY_ATTR {
-    tangents ? skin(formula, scales, std::true_type()) : skin(formula, scales, std::false_type());
-  };
-  const auto byScale = [&](auto formula) HWY_ATTR {
-    palette.scales ? byTangents(formula, std::true_type()) : byTangents(formula, std::false_type());
-  };
-  if (method == Method::linear) {
-    byTangents(std::integral_constant<Formula, Formula::linear>(), std::false_type());
-  } else if (method == Method::dualQuaternion) {
-    byScale(std::integral_constant<Formula, Formula::turned>());
-  } else {
-    byScale(std::integral_constant<Formula, Formula::other>());
+inline constexpr From fromMesh = !isLone                              ? From::company
+                                 : hn::MaxLanes(D()) == blockVertices ? From::tile
+                                                                      : From::lone;
+
+/// What the vertices from a block on are skinned by.
+inline Skinning skinningOf(const Together& together, const Run& run, std::uint32_t block) {
+  const Task& task = together.task;
+  const MeshData& mesh = *task.mesh;
+  const std::uint64_t slot = run.slotOf(block);
+  return {together.palette,
+          Slots{mesh.jointNumbers.data() + slot, mesh.pairNumbers.data() + slot,
+                mesh.weights.data() + slot, run.influences},
+          sourceOf(mesh, task.method, block),
+          task.places[Stream::normals].format != VertexFormat::none};
+}
+
+/// The positions from `vertex` on that become the previous ones.
+template <bool isLone, class D>
+inline HWY_ATTR Kept<D> keptOf(D d, const Together& together, std::size_t vertex) {
+  const OutputAttribute& positions = together.task.places[Stream::positions];
+  Kept<D> kept{{}, positions.stride, formatSize(positions.format) / 4, {}};
+  for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane) {
+    const TaskInstance& instance = *together.instances[isLone ? 0 : lane];
+    kept.at[lane] =
+        instance.outputs[Stream::positions] + (vertex + (isLone ? lane : 0)) * kept.stride;
+    kept.restarts[lane] = instance.restartsMotion ? 1.0f : 0.0f;
   }
+  return kept;
 }
 
 /// Encodes the attributes of a tile that begins at `vertex`, and stores them.
 template <bool isLone, class D>
-inline HWY_ATTR void storeTile(D d, const Company& company, std::size_t vertex, std::size_t units,
+inline HWY_ATTR void storeTile(D d, const Together& together, std::size_t vertex, std::size_t units,
                                const VertexRange& range, Tile<D>& tile) {
-  const VertexPlaces& places = company.task.places;
-  encodeUnits<Stream::positions>(d, places[Stream::positions].format, units, tile);
-  encodeUnits<Stream::normals>(d, places[Stream::normals].format, units, tile);
-  encodeUnits<Stream::tangents>(d, places[Stream::tangents].format, units, tile);
+  const VertexPlaces& places = together.task.places;
+  const auto encode = [&](auto stream) HWY_ATTR {
+    if (isEncoded(stream(), places[stream()].format))
+      encodeUnits<stream()>(d, places[stream()].format, units, tile);
+  };
+  encode(std::integral_constant<Stream, Stream::positions>());
+  encode(std::integral_constant<Stream, Stream::normals>());
+  encode(std::integral_constant<Stream, Stream::tangents>());
   // The previous positions are those in the output, or those that are stored now.
   const auto copyPositions = [&](bool restart) HWY_ATTR {
-    if (!places.hasMotion()) return;
-    for (std::size_t i = 0; i < company.count; ++i) {
-      const TaskInstance& instance = *company.instances[i];
+    if (!places.hasMotion() || together.common.records.keepsPositions) return;
+    for (std::size_t i = 0; i < together.count; ++i) {
+      const TaskInstance& instance = *together.instances[i];
       if (instance.restartsMotion == restart)
-        keepPositions(company.task, instance, vertex + range.first, vertex + range.end);
+        keepPositions(together.task, instance, vertex + range.first, vertex + range.end);
     }
   };
   copyPositions(false);
-  for (std::size_t number = 0; number < company.records.count; ++number) {
-    const Record& record = company.records.all[number];
+  if (together.common.records.keepsPositions) {
+    Kept<D> kept = keptOf<isLone>(d, together, vertex);
+    for (std::size_t unit = 0; unit < units; ++unit) {
+      const std::size_t first = unit * unitVertices<isLone, D>;
+      if (isLone) {
+        // Other vertices may be another thread's.
+        for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane) {
+          const std::size_t own = std::clamp(first + lane, range.first, range.end - 1);
+          kept.at[lane] = together.instances[0]->outputs[Stream::positions] +
+                          (vertex + own - first) * kept.stride;
+        }
+      } else if (first < range.first || first >= range.end) {
+        continue;
+      }
+      keepUnit<isLone>(d, kept, unit, tile.slots[unit]);
+    }
+  }
+  for (std::size_t number = 0; number < together.common.records.count; ++number) {
+    const Record& record = together.common.records.all[number];
     const std::size_t stride = places[record.stream].stride;
-    std::byte* to[blocksOf<D>];
-    for (std::size_t i = 0; i < company.count; ++i)
-      to[i] = company.instances[i]->outputs[record.stream] + vertex * stride;
-    storeRecord<isLone>(d, record, stride, to, range, tile);
+    constexpr std::size_t lanes = isLone ? 1 : hn::MaxLanes(d);
+    std::byte* to[lanes];
+    for (std::size_t i = 0; i < lanes; ++i)
+      to[i] = together.instances[i]->outputs[record.stream] + vertex * stride;
+    if constexpr (isLone) {
+      storeRecord(d, record, stride, to[0], range, tile);
+    } else {
+      storeRecord(d, record, stride, to, range, tile);
+    }
   }
   copyPositions(true);
 }
 
 /// Skins a tile. Only vertices in the range are stored and count for results.
 template <bool isLone, class D>
-inline HWY_ATTR void skinTile(D d, const Company& company, const Blocks& blocks,
+inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& blocks,
                               const VertexRange& range, Tile<D>& tile, Findings<D>& findings) {
-  const Task& task = company.task;
-  const MeshData& mesh = *task.mesh;
-  const std::size_t units = (blocks.end - blocks.first) * (isLone ? 1 : 2);
+  const Task& task = together.task;
+  const std::size_t units = (blocks.end - blocks.first) * unitsOf<isLone, D>;
   const std::size_t vertex = std::size_t{blocks.first} * blockVertices;
-  fetchOutput(company, vertex, range);
-  const std::uint64_t slot = blocks.run.slotOf(blocks.first);
-  blendTile<isLone>(d, task.method, company.palette,
-                    {mesh.jointNumbers.data() + slot, mesh.pairNumbers.data() + slot,
-                     mesh.weights.data() + slot, blocks.run.influences},
-                    units, tile);
-  Source from = sourceOf(mesh, task.method, blocks.first, isLone);
-  if (company.isMorphed) {
-    morphTile<isLone>(d, mesh, blocks.first, blocks.end, company.morphs, tile, from);
+  fetchOutput(together, vertex, range);
+  Skinning by = skinningOf(together, blocks.run, blocks.first);
+  if (together.common.isMorphed) {
+    morphTile<isLone>(d, *task.mesh, blocks.first, blocks.end, together.morphs, together.count,
+                      tile, by.from);
   }
-  skinByMethod<isLone>(d, task, company.palette, from, units, tile);
-  if (company.hasResults) findBounds<isLone>(d, tile, units, range, findings);
+  Direct<D>* const none = nullptr;
+  byMethod(task, by.palette.scales, [&](auto method, auto scales, auto tangents) HWY_ATTR {
+    by.from.isTile
+        ? skinUnits<isLone, method(), scales(), tangents(), From::tile>(d, by, units, none, tile)
+        : skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(d, by, units, none,
+                                                                                 tile);
+  });
+  if (together.common.hasResults) findBounds<isLone>(d, tile, units, range, findings);
   if (isSnormPosition(task.places[Stream::positions].format))
-    relateToBoxes<isLone>(d, company.instances, units, range, tile, findings);
-  storeTile<isLone>(d, company, vertex, units, range, tile);
+    relateToBoxes<isLone>(d, together.instances, units, range, tile, findings);
+  storeTile<isLone>(d, together, vertex, units, range, tile);
+}
+
+/// Skins the vertices of a run that are in the range: whole blocks directly.
+template <bool isLone, class D>
+inline HWY_ATTR void skinDirectly(D d, const Together& together, const Blocks& blocks,
+                                  const VertexRange& range, Tile<D>& tile, Findings<D>& findings) {
+  const auto whole = static_cast<std::uint32_t>((range.first + blockVertices - 1) / blockVertices);
+  const auto end = static_cast<std::uint32_t>(range.end / blockVertices);
+  const auto skinPart = [&](std::uint32_t block, std::size_t first, std::size_t last) HWY_ATTR {
+    const std::uint32_t number = blocks.first + block;
+    skinTile<isLone>(d, together, {blocks.run, number, number + 1}, {first, last}, tile, findings);
+  };
+  if (range.first != std::size_t{whole} * blockVertices)
+    skinPart(0, range.first, std::min<std::size_t>(range.end, blockVertices));
+  if (whole < end) {
+    const std::uint32_t block = blocks.first + whole;
+    Direct<D> direct{together.common.records, {}, {}};
+    if (together.common.records.keepsPositions)
+      direct.kept = keptOf<isLone>(d, together, std::size_t{block} * blockVertices);
+    for (std::size_t i = 0; i < together.common.records.count; ++i) {
+      const Record& record = together.common.records.all[i];
+      for (std::size_t lane = 0; lane < (isLone ? 1 : hn::MaxLanes(d)); ++lane) {
+        direct.to[i][lane] =
+            reinterpret_cast<float*>(together.instances[lane]->outputs[record.stream]) +
+            std::size_t{block} * blockVertices * record.slots;
+      }
+    }
+    const Skinning by = skinningOf(together, blocks.run, block);
+    byMethod(together.task, by.palette.scales,
+             [&](auto method, auto scales, auto tangents) HWY_ATTR {
+               skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(
+                   d, by, (end - whole) * unitsOf<isLone, D>, &direct, tile);
+             });
+  }
+  if (end >= whole && range.end != std::size_t{end} * blockVertices)
+    skinPart(end, 0, range.end - std::size_t{end} * blockVertices);
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE

@@ -1,8 +1,7 @@
-// The first stage: sums over the influences of a vertex.
+// Sums over the influences of a vertex, which stay in registers.
 #pragma once
 
 #include <cstdint>
-#include <type_traits>
 
 #include "cpu/tile_inl.h"
 
@@ -17,40 +16,53 @@ struct Slots {
   std::uint32_t influences;
 };
 
-/// Calls `sum` with the number of influences: a compile-time constant up to 4, or 0 for more.
-template <class Sum>
-DERMIS_INLINE void byInfluences([[maybe_unused]] std::uint32_t influences, const Sum& sum) {
-#ifdef DERMIS_CPU_STAGES_ONLY
-  influences = 0;
-#endif
-  switch (influences) {
-    case 1:
-      return sum(std::integral_constant<int, 1>());
-    case 2:
-      return sum(std::integral_constant<int, 2>());
-    case 3:
-      return sum(std::integral_constant<int, 3>());
-    case 4:
-      return sum(std::integral_constant<int, 4>());
-    default:
-      return sum(std::integral_constant<int, 0>());
-  }
+// In the functions below, if entries have `pivots`, they are differences to the pivot's, which is
+// added; the first influence, the pivot itself, has none. Four influences, the usual number, take
+// no loop.
+
+template <std::size_t N, class D>
+DERMIS_INLINE void addEntry(D d, const float* entry, float weight, Vec<D> sum[N]) {
+  const Vec<D> w = hn::Set(d, weight);
+  for (std::size_t k = 0; k < N; ++k)
+    sum[k] = hn::Add(sum[k], hn::Mul(w, hn::Load(d, entry + k * hn::MaxLanes(d))));
 }
 
-/// Σ w e of one vertex, over as many floats of each entry as there are lanes, from influence
-/// `begin` on. An entry has 8 · `units` floats. If `influences` is 0, `count` is the number of
-/// influences.
-template <int influences, std::size_t begin, class D>
-DERMIS_INLINE Vec<D> sumVertex(D d, const float* HWY_RESTRICT entries, std::size_t units,
-                               const std::uint16_t* HWY_RESTRICT numbers,
-                               const float* HWY_RESTRICT weights, std::size_t count) {
-  if (influences != 0) count = influences;
-  Vec<D> sum = hn::Zero(d);
-  for (std::size_t i = begin; i < count; ++i) {
-    const Vec<D> part = hn::Mul(hn::Set(d, weights[i]), hn::Load(d, entries + numbers[i] * units));
-    sum = i == begin ? part : hn::Add(sum, part);
+/// Σ w e of unit `unit` of a company: the first N numbers of entries of 8 or, if N > 8, 16.
+template <std::size_t N, bool hasPivots, class D>
+DERMIS_INLINE void sumCompany(D d, const float* entries, const float* pivots,
+                              const std::uint16_t* HWY_RESTRICT numbers, const Slots& slots,
+                              std::size_t unit, Vec<D>* sums) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), stride = (N > 8 ? 2 : 1) * lanes;
+  constexpr std::size_t begin = hasPivots ? 1 : 0;
+  const std::size_t count = slots.influences;
+  const float* const HWY_RESTRICT weights = slots.weights + unit * count;
+  const std::uint16_t* const HWY_RESTRICT own = numbers + unit * count;
+  Vec<D> sum[N];
+  if (begin < count) {
+    const float* const entry = entries + own[begin] * stride;
+    const Vec<D> w = hn::Set(d, weights[begin]);
+    for (std::size_t k = 0; k < N; ++k) sum[k] = hn::Mul(w, hn::Load(d, entry + k * lanes));
+  } else {
+    for (Vec<D>& value : sum) value = hn::Zero(d);
   }
-  return sum;
+#ifndef DERMIS_CPU_SMALL
+  if (count == 4) {
+    addEntry<N>(d, entries + own[begin + 1] * stride, weights[begin + 1], sum);
+    addEntry<N>(d, entries + own[begin + 2] * stride, weights[begin + 2], sum);
+    if constexpr (!hasPivots) addEntry<N>(d, entries + own[3] * stride, weights[3], sum);
+  } else
+#endif
+  {
+    for (std::size_t i = begin + 1; i < count; ++i)
+      addEntry<N>(d, entries + own[i] * stride, weights[i], sum);
+  }
+  for (std::size_t k = 0; k < N; ++k) {
+    if constexpr (hasPivots) {
+      const float* const pivot = pivots + slots.joints[unit * count] * lanes;
+      sum[k] = hn::Add(hn::Load(d, pivot + k * lanes), sum[k]);
+    }
+    sums[k] = sum[k];
+  }
 }
 
 #if HWY_MAX_BYTES >= 32
@@ -65,90 +77,82 @@ DERMIS_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec<Eight> colum
 }
 #endif
 
-/// Σ w e of four vertices of each instance, over K quads. sums[k] gets the components of quad k, a
-/// vertex in each lane of a block. If there are `pivots`, entries are differences to the pivot's,
-/// which is added; the first influence, the pivot itself, has none.
-template <int influences, std::size_t K, bool hasPivots, class D>
-DERMIS_INLINE void sumFour(D d, const float* const* quads, const float* const* pivots,
-                           const std::uint16_t* HWY_RESTRICT numbers,
-                           const std::uint16_t* HWY_RESTRICT joints,
-                           const float* HWY_RESTRICT weights, std::size_t count,
-                           Vec<D> sums[K][4]) {
-  if (influences != 0) count = influences;
+/// Σ w e of a vertex of a lone instance: as many numbers of an entry as D has lanes.
+template <std::size_t influences, std::size_t units, bool hasPivots, class D>
+DERMIS_INLINE Vec<D> sumVertex(D d, const float* entries, const float* pivots,
+                               const std::uint16_t* numbers, const Slots& slots,
+                               std::size_t vertex) {
   constexpr std::size_t begin = hasPivots ? 1 : 0;
-  for (std::size_t vertex = 0; vertex < 4; ++vertex) {
-    const std::size_t first = vertex * count;
-    Vec<D> sum[K];
-    for (std::size_t k = 0; k < K; ++k) sum[k] = hn::Zero(d);
-    for (std::size_t i = begin; i < count; ++i) {
-      const std::size_t entry = std::size_t{numbers[first + i]} * blocksOf<D> / 2;
-      const Vec<D> w = hn::Set(d, weights[first + i]);
-      for (std::size_t k = 0; k < K; ++k) {
-        const Vec<D> part = hn::Mul(w, hn::Load(d, quads[k] + entry));
-        sum[k] = i == begin ? part : hn::Add(sum[k], part);
-      }
-    }
-    if constexpr (hasPivots) {
-      const std::size_t entry = std::size_t{joints[first]} * blocksOf<D> / 2;
-      for (std::size_t k = 0; k < K; ++k) sum[k] = hn::Add(hn::Load(d, pivots[k] + entry), sum[k]);
-    }
-    for (std::size_t k = 0; k < K; ++k) sums[k][vertex] = sum[k];
+  const std::size_t count = influences != 0 ? influences : slots.influences;
+  const std::size_t first = vertex * count;
+  Vec<D> sum = hn::Zero(d);
+  for (std::size_t i = begin; i < count; ++i) {
+    const Vec<D> part = hn::Mul(hn::Set(d, slots.weights[first + i]),
+                                hn::Load(d, entries + numbers[first + i] * units));
+    sum = i == begin ? part : hn::Add(sum, part);
   }
-  for (std::size_t k = 0; k < K; ++k) transpose4(d, sums[k][0], sums[k][1], sums[k][2], sums[k][3]);
+  if constexpr (hasPivots) sum = hn::Add(hn::Load(d, pivots + slots.joints[first]), sum);
+  return sum;
 }
 
-/// Σ w e of each vertex, over the first K quads of each entry, plus the pivot's entry if there are
-/// `pivots`. Writes 4 K vectors for each unit.
-template <bool isLone, std::size_t K, bool hasPivots, class D, std::size_t size>
-HWY_NOINLINE HWY_ATTR void sumUnits(D d, const float* const* quads, const float* const* pivots,
-                                    const std::uint16_t* numbers, const Slots& slots,
-                                    std::size_t units, Vec<D> (*to)[size]) {
-  byInfluences(slots.influences, [&](auto influences) HWY_ATTR {
-    const std::size_t count = influences() != 0 ? influences() : slots.influences;
-    const std::uint16_t* HWY_RESTRICT number = numbers;
-    const std::uint16_t* HWY_RESTRICT joint = slots.joints;
-    const float* HWY_RESTRICT weight = slots.weights;
-    for (std::size_t unit = 0; unit < units; ++unit) {
-      Vec<D>* const own = to[unit];
-      if constexpr (!isLone) {
-        Vec<D> sums[K][4];
-        sumFour<influences(), K, hasPivots>(d, quads, pivots, number, joint, weight, count, sums);
-        for (std::size_t k = 0; k < K; ++k) {
-          for (std::size_t i = 0; i < 4; ++i) own[k * 4 + i] = sums[k][i];
-        }
-        number += 4 * count;
-        joint += 4 * count;
-        weight += 4 * count;
-      } else {
+/// As `sumCompany`, of as many vertices of a lone instance as there are lanes. Writes the numbers
+/// of whole quads.
+template <std::size_t influences, std::size_t N, bool hasPivots, class D>
+DERMIS_INLINE void sumLone(D d, const float* entries, const float* pivots,
+                           const std::uint16_t* numbers, const Slots& slots, std::size_t unit,
+                           Vec<D>* sums) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), units = N > 8 ? 2 : 1;
+  const std::size_t first = unit * lanes;
+  const Four four;
 #if HWY_MAX_BYTES >= 32
-        if constexpr (K >= 2) {
-          constexpr std::size_t begin = hasPivots ? 1 : 0;
-          Vec<D> rows[8];
-          for (std::size_t i = 0; i < 8; ++i) {
-            rows[i] = sumVertex<influences(), begin>(d, quads[0], K == 3 ? 2 : 1,
-                                                     number + i * count, weight + i * count, count);
-            if (hasPivots) rows[i] = hn::Add(hn::LoadU(d, pivots[0] + joint[i * count]), rows[i]);
-          }
-          columnsOf(d, rows, own);
-        }
-        if constexpr (K != 2) {
-          const Four four;
-          Vec<Four> rows[8];
-          for (std::size_t i = 0; i < 8; ++i) {
-            rows[i] = sumVertex<influences(), 0>(four, quads[K - 1], K == 3 ? 2 : 1,
-                                                 number + i * count, weight + i * count, count);
-          }
-          Vec<D>* const last = own + (K - 1) * 4;
-          for (std::size_t i = 0; i < 4; ++i) last[i] = hn::Combine(d, rows[i + 4], rows[i]);
-          transpose4(d, last[0], last[1], last[2], last[3]);
-        }
-        number += 8 * count;
-        joint += 8 * count;
-        weight += 8 * count;
-#endif
-      }
+  constexpr std::size_t wide = (N + 3) / 8 * 8;
+  for (std::size_t k = 0; k < wide; k += 8) {
+    Vec<D> rows[8];
+    for (std::size_t i = 0; i < 8; ++i) {
+      rows[i] = sumVertex<influences, units, hasPivots>(d, entries + k, pivots, numbers, slots,
+                                                        first + i);
     }
-  });
+    columnsOf(d, rows, sums + k);
+  }
+  if constexpr (wide < N) {
+    Vec<Four> rows[8];
+    for (std::size_t i = 0; i < 8; ++i) {
+      rows[i] = sumVertex<influences, units, hasPivots>(four, entries + wide, pivots, numbers,
+                                                        slots, first + i);
+    }
+    Vec<D>* const own = sums + wide;
+    for (std::size_t i = 0; i < 4; ++i) own[i] = hn::Combine(d, rows[i + 4], rows[i]);
+    transpose4(d, own[0], own[1], own[2], own[3]);
+  }
+#else
+  for (std::size_t k = 0; k < N; k += 4) {
+    Vec<D>* const own = sums + k;
+    const float* const pivot = hasPivots ? pivots + k : nullptr;
+    for (std::size_t i = 0; i < 4; ++i) {
+      own[i] = sumVertex<influences, units, hasPivots>(four, entries + k, pivot, numbers, slots,
+                                                       first + i);
+    }
+    transpose4(d, own[0], own[1], own[2], own[3]);
+  }
+#endif
+}
+
+/// The sums of a unit of either.
+template <bool isLone, std::size_t N, bool hasPivots, class D>
+DERMIS_INLINE void sumUnit(D d, const float* entries, const float* pivots,
+                           const std::uint16_t* numbers, const Slots& slots, std::size_t unit,
+                           Vec<D>* sums) {
+#ifdef DERMIS_CPU_SMALL
+  constexpr bool isUsual = false;
+#else
+  const bool isUsual = slots.influences == 4;  // without loops
+#endif
+  if constexpr (isLone) {
+    isUsual ? sumLone<4, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums)
+            : sumLone<0, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
+  } else {
+    sumCompany<N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
+  }
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE

@@ -28,9 +28,10 @@ struct Scratch {
   std::vector<CacheLine> dualQuaternions;  ///< of joints: real and dual part
   std::vector<CacheLine> scaleShears;      ///< of joints: diagonal and mixed entries, and two zeros
   std::vector<CacheLine> rows;             ///< of joints: 3×4, and four zeros
-  std::vector<CacheLine> pairs;            ///< dual quaternions, of up to four instances
+  std::vector<CacheLine> companyJoints;    ///< dual quaternions, a vector for each component
+  std::vector<CacheLine> pairs;            ///< dual quaternions
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
-  std::array<ActiveTargets, 4> morphs;     ///< of each of the instances
+  std::array<ActiveTargets, 16> morphs;    ///< of each of the instances
   std::vector<CacheLine> tile;             ///< what the stages hand to each other
 };
 

@@ -1,4 +1,4 @@
-// What the stages hand to each other: some vertices of several instances, or of a lone one.
+// What the stages hand to each other: some vertices of a company, or of a lone instance.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +14,24 @@ struct MorphedBlock {
   Lanes positions[3], normals[3], tangents[4];
 };
 
-/// Vertices of the instances, in units: a vector for each component. A unit has four vertices of
-/// each instance, or as many of a lone one as there are lanes.
+inline constexpr std::size_t slotCount = 4 * streamCount;
+
+/// Vertices of the instances, in units: a vector for each component. A unit has one vertex of each
+/// member of a company, or as many of a lone instance as there are lanes.
 template <class D>
 struct Tile {
-  static constexpr std::size_t most = 8;  ///< units
+#ifndef DMOST
+#define DMOST 16
+#endif
+  static constexpr std::size_t most = DMOST;  ///< units
+  static constexpr std::size_t mostLone = 8;  ///< of a lone instance
 
-  Vec<D> dualQuaternions[most][8], parts[most][8], rows[most][12];  ///< blended
-  /// Positions, normals and tangents, four vectors each: first their components, then their words.
-  Vec<D> slots[most][12];
+  Vec<D> quaternions[mostLone][8], parts[mostLone][8], rows[mostLone][12];  ///< blended, lone
+  /// Of each stream four vectors: first its components, then its words.
+  Vec<D> slots[most][slotCount];
   Vec<D> positions[most][3], normals[most][3], tangents[most][4];  ///< in bind pose, if morphed
   Vec<D> givenNormals[most][3], givenTangents[most][4];
-  MorphedBlock blocks[most];  ///< of one instance
+  MorphedBlock blocks[hn::MaxLanes(D())];  ///< of each instance
 };
 
 /// The vertices of a tile that belong to the job: `first` to `end`, counted from the tile's first.
@@ -33,9 +39,13 @@ struct VertexRange {
   std::size_t first = 0, end = 0;
 };
 
-/// The vertices of a unit in the lanes of a block, in order.
+/// The vertices of a unit of each instance, in order.
 template <bool isLone, class D>
-inline constexpr std::size_t unitVertices = isLone ? hn::MaxLanes(D()) : 4;
+inline constexpr std::size_t unitVertices = isLone ? hn::MaxLanes(D()) : 1;
+
+/// The units of a block.
+template <bool isLone, class D>
+inline constexpr std::size_t unitsOf = blockVertices / unitVertices<isLone, D>;
 
 template <bool isLone, class D>
 DERMIS_INLINE bool isWhole(const VertexRange& range, std::size_t unit) {
@@ -49,7 +59,7 @@ DERMIS_INLINE hn::Mask<D> lanesInRange(D d, const VertexRange& range, std::size_
   constexpr std::size_t lanes = hn::MaxLanes(d);
   HWY_ALIGN float wanted[lanes];
   for (std::size_t lane = 0; lane < lanes; ++lane) {
-    const std::size_t vertex = unit * unitVertices<isLone, D> + (isLone ? lane : lane % 4);
+    const std::size_t vertex = unit * unitVertices<isLone, D> + (isLone ? lane : 0);
     wanted[lane] = vertex >= range.first && vertex < range.end ? 1.0f : 0.0f;
   }
   return hn::Ne(hn::Load(d, wanted), hn::Zero(d));

@@ -72,13 +72,12 @@ DERMIS_INLINE DirectionMap<D> directionMap(D d, const Vec3<D>& r0, const Vec3<D>
   map.side = sideOf(d, dot3(map.r0, cross3(map.r1, map.r2)));
   return map;
 }
-/// Multiplies by the cofactor matrix and the sign of the determinant, so that a mirror gives the
-/// direction of the inverse transpose.
+/// Multiplies by the cofactor matrix. Times the sign of the determinant, it has the direction of
+/// the inverse transpose, also where a matrix mirrors.
 template <class D>
 DERMIS_INLINE Vec3<D> mapNormal(const DirectionMap<D>& map, const Vec3<D>& n) {
-  const Vec3<D> turned{dot3(cross3(map.r1, map.r2), n), dot3(cross3(map.r2, map.r0), n),
-                       dot3(cross3(map.r0, map.r1), n)};
-  return scale3(turned, map.side);
+  return {dot3(cross3(map.r1, map.r2), n), dot3(cross3(map.r2, map.r0), n),
+          dot3(cross3(map.r0, map.r1), n)};
 }
 template <class D>
 DERMIS_INLINE Vec3<D> mapTangent(const DirectionMap<D>& map, const Vec3<D>& t) {
