@@ -72,7 +72,7 @@ struct Crowd {
     addDenseMorphs();
     mesh.emplace(cpu::Mesh::create(pack(source.view(), crowdJoints).value()).value());
     places = placeVertices(layout, vertexCount).value();
-    output.assign(places.size * crowdSize, untouched);
+    output = before = std::vector<std::byte>(places.size * crowdSize, untouched);
     for (std::uint32_t i = 0; i < crowdSize; ++i) {
       poses.push_back(randomPose(40 + i, crowdJoints, rigidity));
       cpu::Instance instance;
@@ -113,7 +113,7 @@ struct Crowd {
     return job;
   }
   void skin(Method method) {
-    std::ranges::fill(output, untouched);
+    output = before;
     const Result<void> done = cpu::skin(job(method));
     ASSERT_TRUE(done.ok()) << done.error().message;
   }
@@ -135,6 +135,7 @@ struct Crowd {
   OwnedMesh source;
   std::optional<cpu::Mesh> mesh;
   VertexPlaces places;
+  std::vector<std::byte> before;  ///< what `skin` finds in the output
   std::vector<std::byte> output;
   std::vector<std::vector<JointMatrix>> poses;
   std::vector<cpu::Instance> instances;
@@ -218,8 +219,23 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
       }
     }
     crowd.place();
+    for (std::size_t byte = 0; byte < crowd.before.size(); ++byte)
+      crowd.before[byte] = static_cast<std::byte>(byte * 131 + byte / 256);
     crowd.skin(method);
     const std::vector<std::byte> first = crowd.output;
+    for (std::size_t i = 0; layout.motion && i < crowdSize; ++i) {
+      const OutputAttribute &to = crowd.places[Stream::previousPositions],
+                            &from = crowd.places[Stream::positions];
+      const std::vector<std::byte>& kept =
+          crowd.instances[i].restartsMotion ? crowd.output : crowd.before;
+      for (std::size_t vertex = 0; vertex < 333; ++vertex) {
+        const std::size_t place = crowd.places.size * i + vertex * to.stride;
+        ASSERT_EQ(std::memcmp(crowd.output.data() + place + to.offset,
+                              kept.data() + place + from.offset, formatSize(from.format)),
+                  0)
+            << "instance " << i << ", vertex " << vertex;
+      }
+    }
     const std::vector<InstanceResult> found = results;
     const auto expectSame = [&](const std::string& what) {
       EXPECT_TRUE(crowd.output == first) << what;
@@ -234,7 +250,7 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
       ASSERT_TRUE(cpu::setTarget(target).ok());
       crowd.skin(method);
       expectSame(std::string(target));
-      std::ranges::fill(crowd.output, untouched);
+      crowd.output = crowd.before;
       std::vector<InstanceResult> all(crowdSize);
       std::uint32_t begin = 0;
       for (const std::uint32_t end : {13u, 15u, 100u, 104u, 250u, 0xffffffffu}) {
@@ -666,12 +682,17 @@ TEST_F(CpuSkinTest, VerticesOutsideTheRangeStay) {
                                      // inside one block, not at its begin; at the output's end, too
                                      {18u, 21u},
                                      {201u, 203u}}) {
-      std::ranges::fill(crowd.output, untouched);
-      ASSERT_TRUE(cpu::skin(crowd.job(Method::dualQuaternion, begin, end)).ok());
-      for (std::size_t byte = 0; byte < crowd.output.size(); byte += stride) {
-        const std::size_t vertex = byte % crowd.places.size / stride;
-        const bool isWritten = !isUntouched(std::span(crowd.output).subspan(byte, stride));
-        ASSERT_EQ(isWritten, vertex >= begin && vertex < end) << vertex;
+      for (const std::size_t count : {std::size_t{crowdSize}, std::size_t{1}}) {
+        std::ranges::fill(crowd.output, untouched);
+        cpu::Job job = crowd.job(Method::dualQuaternion, begin, end);
+        job.instances = job.instances.first(count);
+        ASSERT_TRUE(cpu::skin(job).ok());
+        for (std::size_t byte = 0; byte < crowd.output.size(); byte += stride) {
+          const std::size_t vertex = byte % crowd.places.size / stride;
+          const bool isWritten = !isUntouched(std::span(crowd.output).subspan(byte, stride));
+          ASSERT_EQ(isWritten, byte / crowd.places.size < count && vertex >= begin && vertex < end)
+              << vertex;
+        }
       }
     }
   }
