@@ -196,8 +196,9 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
       }
     }
     if (direct == nullptr || (place == From::tile && !isLone)) continue;  // the latter: morphed
-    if (direct->records.keepsPositions) {
-      for (std::size_t i = 0; i < count; ++i) keepUnit<isLone>(d, direct->kept, first + i, own[i]);
+    for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
+      const std::size_t vertex = (first + i) * unitVertices<isLone, D>;
+      keepUnit(d, direct->kept, vertex * direct->kept.stride, own[i]);
     }
     for (std::size_t number = 0; number < direct->records.count; ++number) {
       const Record& record = direct->records.all[number];

@@ -156,17 +156,17 @@ inline HWY_ATTR void storeTile(D d, const Together& together, std::size_t vertex
     Kept<D> kept = keptOf<isLone>(d, together, vertex);
     for (std::size_t unit = 0; unit < units; ++unit) {
       const std::size_t first = unit * unitVertices<isLone, D>;
-      if (isLone) {
+      if constexpr (isLone) {
         // Other vertices may be another thread's.
         for (std::size_t lane = 0; lane < hn::MaxLanes(d); ++lane) {
           const std::size_t own = std::clamp(first + lane, range.first, range.end - 1);
-          kept.at[lane] = together.instances[0]->outputs[Stream::positions] +
-                          (vertex + own - first) * kept.stride;
+          kept.at[lane] =
+              together.instances[0]->outputs[Stream::positions] + (vertex + own) * kept.stride;
         }
-      } else if (first < range.first || first >= range.end) {
-        continue;
+        keepUnit(d, kept, 0, tile.slots[unit]);
+      } else if (first >= range.first && first < range.end) {
+        keepUnit(d, kept, first * kept.stride, tile.slots[unit]);
       }
-      keepUnit<isLone>(d, kept, unit, tile.slots[unit]);
     }
   }
   for (std::size_t number = 0; number < together.common.records.count; ++number) {

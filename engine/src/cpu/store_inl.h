@@ -80,10 +80,10 @@ DERMIS_INLINE Vec<D> loadWords(D d, const std::byte* const* at, std::size_t offs
 }
 #endif
 
-/// Puts the kept positions of a unit, whose words have been made, into its slots.
-template <bool isLone, class D>
-DERMIS_INLINE void keepUnit(D d, const Kept<D>& kept, std::size_t unit, Vec<D>* slots) {
-  const std::size_t offset = unit * unitVertices<isLone, D> * kept.stride;
+/// Puts the kept positions of a unit, whose words have been made, into its slots. `offset`: bytes
+/// from the tile's first unit.
+template <class D>
+DERMIS_INLINE void keepUnit(D d, const Kept<D>& kept, std::size_t offset, Vec<D>* slots) {
   Vec<D> v[4];
   for (std::size_t k = 0; k < 4; ++k) v[k] = loadWords(d, kept.at + k, offset, kept.words);
   transpose4(d, v[0], v[1], v[2], v[3]);
