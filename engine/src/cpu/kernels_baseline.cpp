@@ -1,7 +1,7 @@
 // The kernels that need nothing but what the compiler assumes. On arm64, these are the kernels for
 // NEON. On x86 they are the fallback for processors without SSE4: for SSE2 or, with Highway 1.0,
-// for EMU128, which is plain code. The fallback is made small, and samples
-// figures and evaluates rigs by the code of core.
+// for EMU128, which is plain code. The fallback is made small, and samples figures and evaluates
+// rigs by the code of core.
 #include "cpu/kernels.h"
 
 #ifdef DERMIS_CPU_HAS_BASELINE

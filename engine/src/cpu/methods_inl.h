@@ -1,6 +1,8 @@
 // The second stage: skins the vertices of a tile by a method.
 #pragma once
 
+#include <type_traits>
+
 #include "cpu/bind_inl.h"
 #include "cpu/store_inl.h"
 #include "cpu/sums_inl.h"
@@ -143,18 +145,20 @@ DERMIS_INLINE void skinUnit(D d, const Skinning& by, const Blended<D>& blended, 
 }
 
 /// Blends what a unit needs.
-template <bool isLone, Method method, bool scales, class D>
+template <bool isLone, std::size_t influences, Method method, bool scales, class D>
 DERMIS_INLINE void blendUnit(D d, const Palette& palette, const Slots& slots, std::size_t unit,
                              Vec<D>* quaternion, Vec<D>* part, Vec<D>* rows) {
   if constexpr (needsRows(method))
-    sumUnit<isLone, 12, false>(d, palette.rows, nullptr, slots.joints, slots, unit, rows);
+    sumUnit<isLone, influences, 12, false>(d, palette.rows, nullptr, slots.joints, slots, unit,
+                                           rows);
   if constexpr (scales) {
-    sumUnit<isLone, 6, true>(d, palette.partPairs, palette.parts, slots.pairs, slots, unit, part);
+    sumUnit<isLone, influences, 6, true>(d, palette.partPairs, palette.parts, slots.pairs, slots,
+                                         unit, part);
   }
   constexpr std::size_t numbers = method == Method::centerOfRotation ? 4 : 8;
   if constexpr (method != Method::linear) {
-    sumUnit<isLone, numbers, false>(d, palette.pairs, nullptr, slots.pairs, slots, unit,
-                                    quaternion);
+    sumUnit<isLone, influences, numbers, false>(d, palette.pairs, nullptr, slots.pairs, slots, unit,
+                                                quaternion);
   }
 }
 
@@ -165,6 +169,23 @@ struct Direct {
   float* to[streamCount][hn::MaxLanes(D())];
   Kept<D> kept;
 };
+
+/// Blends what units of a lone instance need, into the tile: `count` from `first` on. A loop of its
+/// own: one for all would be too long for a processor to begin a unit before the last one ends.
+template <Method method, bool scales, class D>
+HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
+                                     std::size_t first, std::size_t count, Tile<D>& tile) {
+  const auto blend = [&](auto influences) HWY_ATTR {
+    for (std::size_t i = 0; i < count; ++i) {
+      blendUnit<true, influences(), method, scales>(
+          d, palette, slots, first + i, tile.quaternions[i], tile.parts[i], tile.rows[i]);
+    }
+  };
+#ifndef DERMIS_CPU_SMALL
+  if (slots.influences == 4) return blend(std::integral_constant<std::size_t, 4>());
+#endif
+  blend(std::integral_constant<std::size_t, 0>());
+}
 
 /// Skins units into the tile. If they are stored directly, they are those of whole blocks.
 template <bool isLone, Method method, bool scales, bool tangents, From place, class D>
@@ -178,11 +199,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
     const std::size_t count = isLone ? std::min(step, units - first) : step;
     Vec<D>(*const own)[slotCount] = tile.slots + (direct == nullptr ? first : 0);
     if constexpr (isLone) {
-      // One loop would be too long for a processor to begin a unit before the last one ends.
-      for (std::size_t i = 0; i < count; ++i) {
-        blendUnit<true, method, scales>(d, palette, by.slots, first + i, tile.quaternions[i],
-                                        tile.parts[i], tile.rows[i]);
-      }
+      blendLone<method, scales>(d, palette, by.slots, first, count, tile);
       for (std::size_t i = 0; i < count; ++i) {
         skinUnit<method, scales, tangents, place, From::lone>(
             d, by, {tile.quaternions[i], tile.parts[i], tile.rows[i]}, first + i, own[i]);
@@ -190,7 +207,8 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
     } else {
       for (std::size_t i = 0; i < count; ++i) {
         Vec<D> quaternion[8], part[8], rows[12];
-        blendUnit<false, method, scales>(d, palette, by.slots, first + i, quaternion, part, rows);
+        blendUnit<false, 0, method, scales>(d, palette, by.slots, first + i, quaternion, part,
+                                            rows);
         skinUnit<method, scales, tangents, place, From::company>(d, by, {quaternion, part, rows},
                                                                  first + i, own[i]);
       }

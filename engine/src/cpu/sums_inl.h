@@ -137,19 +137,13 @@ DERMIS_INLINE void sumLone(D d, const float* entries, const float* pivots,
 #endif
 }
 
-/// The sums of a unit of either.
-template <bool isLone, std::size_t N, bool hasPivots, class D>
+/// The sums of a unit of either. `influences`: of a lone instance, if it is a constant, or 0.
+template <bool isLone, std::size_t influences, std::size_t N, bool hasPivots, class D>
 DERMIS_INLINE void sumUnit(D d, const float* entries, const float* pivots,
                            const std::uint16_t* numbers, const Slots& slots, std::size_t unit,
                            Vec<D>* sums) {
-#ifdef DERMIS_CPU_SMALL
-  constexpr bool isUsual = false;
-#else
-  const bool isUsual = slots.influences == 4;  // without loops
-#endif
   if constexpr (isLone) {
-    isUsual ? sumLone<4, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums)
-            : sumLone<0, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
+    sumLone<influences, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
   } else {
     sumCompany<N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
   }
