@@ -26,6 +26,7 @@ struct SectionTask {
   std::uint32_t firstVertex, vertexEnd;  ///< within these runs
 };
 
+/// More blocks than any run has.
 inline constexpr std::uint32_t mostBlocks = ~std::uint32_t{0} / blockVertices / 2;
 
 /// The vertices of a run that a job skins.
@@ -35,7 +36,7 @@ inline void clipToRun(const SectionTask& part, const Run& run, std::uint32_t& fi
   end = std::min(part.vertexEnd, run.blockEnd * blockVertices);
 }
 
-// -- Instances that are skinned together: as many as a vector has blocks, or a lone one.
+// -- Instances that are skinned together: a company, or a lone one.
 
 /// Calls `skin` for the blocks of each run that lie in the job, at most `most` at a time.
 template <class Skin>

@@ -1,6 +1,8 @@
-// The second stage: skins the vertices of a tile by a method.
+// The first stage: blends what a method needs, and skins the vertices of a tile by it. Blocks of a
+// company that no other stage changes are stored here, too.
 #pragma once
 
+#include <algorithm>
 #include <type_traits>
 
 #include "cpu/bind_inl.h"
@@ -213,7 +215,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
                                                                  first + i, own[i]);
       }
     }
-    if (direct == nullptr || (place == From::tile && !isLone)) continue;  // the latter: morphed
+    if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
       const std::size_t vertex = (first + i) * unitVertices<isLone, D>;
       keepUnit(d, direct->kept, vertex * direct->kept.stride, own[i]);

@@ -1,4 +1,4 @@
-// The third stage: bounds and clamped vertices of the instances in a tile.
+// The second stage: bounds and clamped vertices of the instances in a tile.
 #pragma once
 
 #include <algorithm>

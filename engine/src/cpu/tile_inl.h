@@ -14,16 +14,14 @@ struct MorphedBlock {
   Lanes positions[3], normals[3], tangents[4];
 };
 
+/// Vectors for what is stored of a unit.
 inline constexpr std::size_t slotCount = 4 * streamCount;
 
 /// Vertices of the instances, in units: a vector for each component. A unit has one vertex of each
 /// member of a company, or as many of a lone instance as there are lanes.
 template <class D>
 struct Tile {
-#ifndef DMOST
-#define DMOST 16
-#endif
-  static constexpr std::size_t most = DMOST;  ///< units
+  static constexpr std::size_t most = 16;     ///< units: two blocks of a company
   static constexpr std::size_t mostLone = 8;  ///< of a lone instance
 
   Vec<D> quaternions[mostLone][8], parts[mostLone][8], rows[mostLone][12];  ///< blended, lone
@@ -47,6 +45,7 @@ inline constexpr std::size_t unitVertices = isLone ? hn::MaxLanes(D()) : 1;
 template <bool isLone, class D>
 inline constexpr std::size_t unitsOf = blockVertices / unitVertices<isLone, D>;
 
+/// Whether all vertices of a unit belong to the job.
 template <bool isLone, class D>
 DERMIS_INLINE bool isWhole(const VertexRange& range, std::size_t unit) {
   const std::size_t first = unit * unitVertices<isLone, D>;
