@@ -211,11 +211,12 @@ inline HWY_ATTR void convertPairs(std::span<const Pair> pairs,
                                   const DualQuaternionArray<const float>& joints, float* to) {
   const Four d;
   const hn::Repartition<double, Four> dd;
+  const auto [first, stride, apart] = joints;  // which what is stored could change
   for (const Pair& pair : pairs) {
-    const float* const joint = joints.first + std::size_t{pair.joint} * joints.stride;
-    const Vec<Four> pivot = hn::LoadU(d, joints.first + std::size_t{pair.pivot} * joints.stride);
+    const float* const joint = first + pair.joint * stride;
+    const Vec<Four> pivot = hn::LoadU(d, first + pair.pivot * stride);
     const Vec<Four> real = hn::LoadU(d, joint);
-    const Vec<Four> dual = hn::LoadU(d, joint + joints.dual);
+    const Vec<Four> dual = hn::LoadU(d, joint + apart);
     Vec<Four> sum = hn::Mul(pivot, real);
     sum = hn::Add(sum, hn::Reverse2(d, sum));
     sum = hn::Add(sum, hn::BitCast(d, hn::Reverse2(dd, hn::BitCast(dd, sum))));

@@ -143,7 +143,7 @@ inline Records recordsOf(const VertexPlaces& places, const TaskInstance* const* 
     };
     record.isDense = record.bytes == places[record.stream].stride && record.bytes % 4 == 0 &&
                      std::all_of(instances, instances + instanceCount, isAligned);
-    for (std::uint32_t word = 0; word < record.slots * blockVertices; ++word) {
+    for (std::uint32_t word = 0; lanes > 1 && word < record.slots * blockVertices; ++word) {
       const std::size_t vertex = word / record.slots;
       record.words[word] = static_cast<std::uint16_t>(
           (vertex * std::size(record.slot) + record.slot[word % record.slots]) * lanes);
