@@ -208,9 +208,15 @@ TEST_P(CpuMethodTest, NoBitDependsOnInstructionSetRangeOrCompany) {
     Crowd crowd(333, 5, rigidity, layout);
     std::vector<InstanceResult> results(crowdSize);
     // Companies with results pass through all stages; those without may be stored directly.
-    constexpr std::array<std::size_t, 4> withResults{1, 7, 9, 11};
+    constexpr std::array<std::size_t, 5> withResults{1, 7, 9, 11, 13};
     for (const std::size_t i : withResults) crowd.instances[i].result = &results[i];
-    crowd.instances[2].morphs = morphs;
+    // Some together, each with other weights, and without another target.
+    std::vector<std::vector<MorphWeight>> ownMorphs(12, morphs);
+    for (std::size_t i = 2; i < ownMorphs.size(); ++i) {
+      for (MorphWeight& morph : ownMorphs[i]) morph.weight *= 0.1f * static_cast<float>(i);
+      ownMorphs[i].erase(ownMorphs[i].begin() + static_cast<std::ptrdiff_t>(i % morphs.size()));
+      crowd.instances[i].morphs = ownMorphs[i];
+    }
     for (const std::size_t i : {5u, 17u}) crowd.instances[i].restartsMotion = layout.motion;
     crowd.poses[3] = randomPose(5, crowdJoints, Rigidity::shear);
     for (JointMatrix& joint : crowd.poses[4]) {
@@ -277,6 +283,43 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::ValuesIn(everydayMethods),
                        ::testing::Values(Rigidity::rigid, Rigidity::uniformScale, Rigidity::shear,
                                          Rigidity::mirrored, Rigidity::mirroredAlongOneAxis)));
+
+// Were they added with weight 0, -0 would become 0.
+TEST_F(CpuSkinTest, TargetsOfOtherInstancesChangeNoBit) {
+  OwnedMesh source = randomMesh(1, 8, 1, 1);
+  for (std::size_t i = 0; i < source.normals.size(); ++i)
+    source.normals[i] = i % 3 == 1 ? 1.0f : -0.0f;
+  for (const std::uint32_t first : {0u, 4u}) {
+    samples::OwnedMorph& morph = source.morphs.emplace_back();
+    morph.vertices = {first, first + 1, first + 2, first + 3};
+    morph.normals.assign(12, 1);
+  }
+  const cpu::Mesh mesh = cpu::Mesh::create(pack(source.view(), 1).value()).value();
+  const VertexPlaces places = placeVertices(plainLayout, 8).value();
+  JointMatrix pose;
+  pose.m[1][2] = -0.0f;  // so that x remains -0
+  const std::array<MorphWeight, 2> morphs{{{0, 1}, {1, 1}}};
+  for (const std::string_view target : cpu::targetNames()) {
+    ASSERT_TRUE(cpu::setTarget(target).ok());
+    std::vector<std::byte> output(places.size * 16);
+    std::vector<cpu::Instance> instances(16);
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+      instances[i].pose = {&pose, 1};
+      instances[i].morphs = {&morphs[i % 2], 1};
+      instances[i].output.fill(output.data() + places.size * i);
+    }
+    ASSERT_TRUE(cpu::skin(jobOf(mesh, Method::linear, places, instances)).ok());
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+      for (std::size_t vertex = 0; vertex < 8; ++vertex) {
+        float x;
+        std::memcpy(&x, output.data() + places.size * i + vertex * 24 + 12, sizeof(x));
+        const bool isDisplaced = vertex / 4 == i % 2;
+        EXPECT_EQ(x > 0, isDisplaced) << target;
+        EXPECT_NE(std::signbit(x), isDisplaced) << target;
+      }
+    }
+  }
+}
 
 // A direction without length in another lane is normalized in another way.
 TEST_F(CpuSkinTest, ATinyComponentHasTheSameBitsBesideAnyOtherVertex) {

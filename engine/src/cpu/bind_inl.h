@@ -73,7 +73,7 @@ inline HWY_ATTR void displaceAll(const std::uint32_t* words,
                                  const BlockDisplacements& displacements,
                                  Lanes* const* components) {
   const Wide d;
-  const Vec<Wide> w = hn::Set(d, displacements.weight);
+  const Vec<Wide> w = hn::Set(d, displacements.target->weights[0]);
   const std::size_t size = displacements.size;
   for (std::size_t lane = 0; lane < blockVertices; lane += hn::MaxLanes(d)) {
     const auto* const from = reinterpret_cast<const float*>(words) + lane * size;
@@ -134,52 +134,86 @@ inline HWY_ATTR void morphBlock(const MeshData& mesh, std::uint32_t number, Acti
   }
 }
 
-/// Morphs the vertices of a tile for instances that have active targets. `active`: those of each.
+/// Morphs a block of a lone instance, and puts it into the units of the tile from `unit` on.
+template <class D>
+inline HWY_ATTR void morphLone(D d, const MeshData& mesh, std::uint32_t number,
+                               ActiveTargets& active, std::size_t unit, Tile<D>& tile) {
+  const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
+  MorphedBlock& block = tile.block;
+  std::copy_n(mesh.positions.data() + number * std::size_t{3}, 3, block.positions);
+  if (normals) std::copy_n(mesh.givenNormals.data() + number * std::size_t{3}, 3, block.normals);
+  if (tangents) {
+    std::copy_n(mesh.givenTangents.data() + number * std::size_t{4}, 3, block.tangents);
+    block.tangents[3] = mesh.tangents[number * std::size_t{4} + 3];
+  }
+  morphBlock(mesh, number, active, block);
+  for (std::size_t first = 0; first < blockVertices; first += hn::MaxLanes(d), ++unit) {
+    const auto load = [&](const Lanes* from, std::size_t count, Vec<D>* to) HWY_ATTR {
+      for (std::size_t c = 0; c < count; ++c) to[c] = hn::Load(d, from[c].v + first);
+    };
+    load(block.positions, 3, tile.positions[unit]);
+    if (normals) load(block.normals, 3, tile.givenNormals[unit]);
+    if (!tangents) continue;
+    load(block.tangents, 3, tile.givenTangents[unit]);
+    load(block.tangents + 3, 1, tile.tangents[unit] + 3);
+  }
+}
+
+/// Morphs a block of a company, with the weights of its members in the lanes.
+template <class D>
+inline HWY_ATTR void morphCompany(D d, const MeshData& mesh, std::uint32_t number,
+                                  ActiveTargets& active, std::size_t unit, Tile<D>& tile) {
+  const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
+  const Source from = sourceOf(mesh, Method::dualQuaternion, number);
+  for (std::size_t vertex = 0; vertex < blockVertices; ++vertex) {
+    const auto load = [&](const float* values, std::size_t components, std::size_t first,
+                          std::size_t end, Vec<D>* to) HWY_ATTR {
+      for (std::size_t c = first; c < end; ++c)
+        to[c] = loadComponent<From::company>(d, values, components, c, vertex);
+    };
+    load(from.positions, 3, 0, 3, tile.positions[unit + vertex]);
+    if (normals) load(from.givenNormals, 3, 0, 3, tile.givenNormals[unit + vertex]);
+    if (!tangents) continue;
+    load(from.givenTangents, 4, 0, 3, tile.givenTangents[unit + vertex]);
+    load(from.tangents, 4, 3, 4, tile.tangents[unit + vertex]);
+  }
+  active.find(mesh, number * blockVertices / abi::MORPH_BLOCK_VERTICES);
+  for (const BlockDisplacements& displacements : active.displacements) {
+    const Displacements part = partOf(displacements, number);
+    const auto* word = reinterpret_cast<const float*>(part.words);
+    const Vec<D> w = hn::Load(d, displacements.target->weights);
+    const auto isActive = hn::Ne(w, hn::Zero(d));
+    for (std::uint32_t mask = part.mask; mask != 0; mask &= mask - 1) {
+      const std::size_t own = unit + static_cast<std::size_t>(std::countr_zero(mask));
+      const auto add = [&](std::uint32_t attribute, bool isWanted, Vec<D>* to) HWY_ATTR {
+        if ((displacements.attributes & attribute) == 0) return;
+        for (std::size_t k = 0; isWanted && k < 3; ++k) {
+          const Vec<D> sum = hn::Add(to[k], hn::Mul(w, hn::Set(d, word[k])));
+          to[k] = hn::IfThenElse(isActive, sum, to[k]);
+        }
+        word += 3;
+      };
+      add(abi::MORPH_HAS_POSITIONS, true, tile.positions[own]);
+      add(abi::MORPH_HAS_NORMALS, normals, tile.givenNormals[own]);
+      add(abi::MORPH_HAS_TANGENTS, tangents, tile.givenTangents[own]);
+    }
+  }
+}
+
+/// Morphs the vertices of a tile for instances that have active targets.
 template <bool isLone, class D>
 HWY_NOINLINE HWY_ATTR void morphTile(D d, const MeshData& mesh, std::uint32_t firstBlock,
-                                     std::uint32_t blockEnd, ActiveTargets* active,
-                                     std::size_t count, Tile<D>& tile, Source& from) {
-  constexpr std::size_t lanes = hn::MaxLanes(d), step = isLone ? lanes : 4;
+                                     std::uint32_t blockEnd, ActiveTargets& active, Tile<D>& tile,
+                                     Source& from) {
   const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
-  const float* blocks[lanes];
-  for (std::size_t i = 0; i < lanes; ++i)
-    blocks[i] = numbersOf(tile.blocks[std::min(i, count - 1)].positions);
   std::size_t units = 0;
-  for (std::size_t number = firstBlock; number < blockEnd; ++number) {
-    for (std::size_t i = 0; i < count; ++i) {
-      MorphedBlock& block = tile.blocks[i];
-      std::copy_n(mesh.positions.data() + number * 3, 3, block.positions);
-      if (normals) std::copy_n(mesh.givenNormals.data() + number * 3, 3, block.normals);
-      if (tangents) {
-        std::copy_n(mesh.givenTangents.data() + number * 4, 3, block.tangents);
-        block.tangents[3] = mesh.tangents[number * 4 + 3];
-      }
-      morphBlock(mesh, static_cast<std::uint32_t>(number), active[i], block);
+  for (std::uint32_t number = firstBlock; number < blockEnd; ++number) {
+    if constexpr (isLone) {
+      morphLone(d, mesh, number, active, units, tile);
+    } else {
+      morphCompany(d, mesh, number, active, units, tile);
     }
-    // Component `component` of a morphed block, to component `to(unit)` of its units.
-    const auto spread = [&](std::size_t component, const auto& to) HWY_ATTR {
-      for (std::size_t vertex = 0; vertex < blockVertices; vertex += step) {
-        const std::size_t offset = component * blockVertices + vertex;
-        if constexpr (isLone) {
-          to(units + vertex / lanes) = hn::Load(d, blocks[0] + offset);
-        } else {
-          const Vec4<D> four = gatherRows(d, blocks, offset);
-          to(units + vertex) = four.x;
-          to(units + vertex + 1) = four.y;
-          to(units + vertex + 2) = four.z;
-          to(units + vertex + 3) = four.w;
-        }
-      }
-    };
-    for (std::size_t c = 0; c < 3; ++c) {
-      spread(c, [&](std::size_t unit) -> Vec<D>& { return tile.positions[unit][c]; });
-      if (normals)
-        spread(3 + c, [&](std::size_t unit) -> Vec<D>& { return tile.givenNormals[unit][c]; });
-      if (tangents)
-        spread(6 + c, [&](std::size_t unit) -> Vec<D>& { return tile.givenTangents[unit][c]; });
-    }
-    if (tangents) spread(9, [&](std::size_t unit) -> Vec<D>& { return tile.tangents[unit][3]; });
-    units += blockVertices / unitVertices<isLone, D>;
+    units += unitsOf<isLone, D>;
   }
   const Vec3<D> none{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   const auto unitVector = [&](const Vec<D>* given, Vec<D>* to) HWY_ATTR {

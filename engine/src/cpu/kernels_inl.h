@@ -63,10 +63,13 @@ template <bool isLone, class D>
 inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Common& common,
                                   const Palette& palette, const TaskInstance* const* instances,
                                   std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i)
-    part.scratch[0].morphs[i].begin(*part.task.mesh, instances[i]->morphs);
-  const Together together{part.task, instances, count,
-                          common,    palette,   part.scratch[0].morphs.data()};
+  ActiveTargets& targets = part.scratch[0].morphs;
+  if (common.isMorphed) {
+    std::span<const MorphWeight> morphs[isLone ? 1 : hn::MaxLanes(d)];
+    for (std::size_t i = 0; i < std::size(morphs); ++i) morphs[i] = instances[i]->morphs;
+    targets.begin(*part.task.mesh, morphs);
+  }
+  const Together together{part.task, instances, count, common, palette, targets};
   Findings<D> findings(d);
   // Not on the stack: an engine's fibers may have little of it.
   auto& tile = *new (floatsOf(part.scratch[0].tile, sizeof(Tile<D>) / sizeof(float))) Tile<D>;

@@ -245,8 +245,8 @@ MeshData MeshData::select(std::span<const std::uint32_t> vertices,
     std::copy_n(positions.data() + std::size_t{block} * 3, 3, displaced);
     for (const MorphWeight& morph : morphs) {
       if (morph.weight == 0) continue;
-      const auto found =
-          displacementsOf(*this, activeTarget(*this, morph), vertex / abi::MORPH_BLOCK_VERTICES);
+      const ActiveTarget target = activeTarget(*this, morph);
+      const auto found = displacementsOf(*this, target, vertex / abi::MORPH_BLOCK_VERTICES);
       if (found) displace(partOf(*found, block), *found, displaced, nullptr, nullptr);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,5 +1,6 @@
 #include "cpu/morph.h"
 
+#include <algorithm>
 #include <bit>
 #include <utility>
 
@@ -11,7 +12,30 @@ ActiveTarget activeTarget(const MeshData& mesh, const MorphWeight& morph) {
   const std::span<const std::uint32_t> words(mesh.packed);
   const auto header = abi::load<abi::MeshHeader>(words, 0);
   const std::size_t place = header.morphs + std::size_t{morph.target} * abi::MORPH_WORDS;
-  return {abi::load<abi::MorphRecord>(words, place), morph.weight};
+  return {.record = abi::load<abi::MorphRecord>(words, place), .weights = {morph.weight}};
+}
+
+void ActiveTargets::begin(const MeshData& mesh, std::span<std::span<const MorphWeight>> morphs) {
+  number = ~std::uint32_t{0};
+  all.clear();
+  while (true) {
+    MorphWeight next{~std::uint32_t{0}, 0};
+    for (const std::span<const MorphWeight> rest : morphs) {
+      if (!rest.empty()) next.target = std::min(next.target, rest.front().target);
+    }
+    if (next.target == ~std::uint32_t{0}) return;
+    ActiveTarget target = activeTarget(mesh, next);
+    bool isActive = false;
+    for (std::size_t i = 0; i < morphs.size(); ++i) {
+      std::span<const MorphWeight>& rest = morphs[i];
+      if (!rest.empty() && rest.front().target == next.target) {
+        target.weights[i] = rest.front().weight;
+        rest = rest.subspan(1);
+      }
+      isActive = isActive || target.weights[i] != 0;
+    }
+    if (isActive) all.push_back(target);
+  }
 }
 
 void displace(const Displacements& part, const BlockDisplacements& displacements, Lanes* positions,
@@ -24,7 +48,7 @@ void displace(const Displacements& part, const BlockDisplacements& displacements
                                            {abi::MORPH_HAS_TANGENTS, tangents}}) {
       if ((displacements.attributes & attribute) == 0) continue;
       for (std::size_t k = 0; lanes != nullptr && k < 3; ++k)
-        lanes[k].v[lane] += displacements.weight * std::bit_cast<float>(word[k]);
+        lanes[k].v[lane] += displacements.target->weights[0] * std::bit_cast<float>(word[k]);
       word += 3;
     }
   }

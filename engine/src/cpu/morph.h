@@ -14,12 +14,13 @@
 
 namespace dermis::cpu {
 
-/// A target with a weight other than 0.
+/// A target with a weight other than 0 for one or more of the instances that are skinned together.
 struct ActiveTarget {
   abi::MorphRecord record;
-  float weight;
+  alignas(64) float weights[16] = {};  ///< for each
 };
 
+/// For one instance.
 ActiveTarget activeTarget(const MeshData& mesh, const MorphWeight& morph);
 
 /// What a target displaces of the vertices of a mesh, `abi::MORPH_BLOCK_VERTICES` of them.
@@ -30,7 +31,7 @@ struct BlockDisplacements {
   const std::uint32_t* words = nullptr;
   std::size_t size = 0;  ///< words for each vertex
   std::uint32_t attributes = 0;
-  float weight = 0;
+  const ActiveTarget* target = nullptr;
 };
 
 /// Those of block `number`, or nothing. Inline, so that the code of an instruction set counts bits
@@ -38,7 +39,7 @@ struct BlockDisplacements {
 inline std::optional<BlockDisplacements> displacementsOf(const MeshData& mesh,
                                                          const ActiveTarget& active,
                                                          std::uint32_t number) {
-  const auto& [target, weight] = active;
+  const abi::MorphRecord& target = active.record;
   const std::uint32_t place = number - target.firstBlock;
   if (place >= target.blockCount) return {};  // a block before the first one wraps around
   const auto record = abi::load<abi::MorphBlockRecord>(
@@ -47,22 +48,17 @@ inline std::optional<BlockDisplacements> displacementsOf(const MeshData& mesh,
   if (mask == 0) return {};
   const std::size_t size = static_cast<std::size_t>(std::popcount(target.attributes)) * 3;
   return BlockDisplacements{mask, mesh.packed.data() + record.displacements, size,
-                            target.attributes, weight};
+                            target.attributes, &active};
 }
 
-/// What the active targets of an instance displace of the vertices that were asked for last.
+/// What active targets displace of the vertices that were asked for last.
 struct ActiveTargets {
   std::vector<ActiveTarget> all;  ///< in ascending order
   std::uint32_t number = 0;       ///< of the block
   std::vector<BlockDisplacements> displacements;
 
-  void begin(const MeshData& mesh, std::span<const MorphWeight> morphs) {
-    number = ~std::uint32_t{0};
-    all.clear();
-    for (const MorphWeight& morph : morphs) {
-      if (morph.weight != 0) all.push_back(activeTarget(mesh, morph));
-    }
-  }
+  /// `morphs`: those of each instance that are not in `all` yet, in ascending order of targets.
+  void begin(const MeshData& mesh, std::span<std::span<const MorphWeight>> morphs);
   void find(const MeshData& mesh, std::uint32_t block) {
     if (block == number) return;
     number = block;
@@ -88,8 +84,8 @@ inline Displacements partOf(const BlockDisplacements& displacements, std::uint32
       displacements.words + static_cast<std::size_t>(std::popcount(before)) * displacements.size};
 }
 
-/// Adds them to a block. `positions`, `normals` and `tangents` have three components each; null if
-/// not wanted.
+/// Adds them to a block of the first instance. `positions`, `normals` and `tangents` have three
+/// components each; null if not wanted.
 void displace(const Displacements& part, const BlockDisplacements& displacements, Lanes* positions,
               Lanes* normals, Lanes* tangents);
 

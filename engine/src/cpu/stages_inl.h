@@ -54,7 +54,7 @@ struct Together {
   std::size_t count;                     ///< without repetitions
   const Common& common;
   const Palette& palette;
-  ActiveTargets* morphs;  ///< of each instance
+  ActiveTargets& morphs;
 };
 
 /// Fetches what `storeTile` writes last: stores would wait for it. Always inlined: GCC removes
@@ -195,8 +195,7 @@ inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& block
   fetchOutput(together, vertex, range);
   Skinning by = skinningOf(together, blocks.run, blocks.first);
   if (together.common.isMorphed) {
-    morphTile<isLone>(d, *task.mesh, blocks.first, blocks.end, together.morphs, together.count,
-                      tile, by.from);
+    morphTile<isLone>(d, *task.mesh, blocks.first, blocks.end, together.morphs, tile, by.from);
   }
   Direct<D>* const none = nullptr;
   byMethod(task, by.palette.scales, [&](auto method, auto scales, auto tangents) HWY_ATTR {

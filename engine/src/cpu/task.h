@@ -31,8 +31,8 @@ struct Scratch {
   std::vector<CacheLine> companyJoints;    ///< dual quaternions, a vector for each component
   std::vector<CacheLine> pairs;            ///< dual quaternions
   std::vector<CacheLine> scalePairs;       ///< the joint's scale/shear part minus the pivot's
-  std::array<ActiveTargets, 16> morphs;    ///< of each of the instances
-  std::vector<CacheLine> tile;             ///< what the stages hand to each other
+  ActiveTargets morphs;
+  std::vector<CacheLine> tile;  ///< what the stages hand to each other
 };
 
 struct ClipPlan;

@@ -24,12 +24,13 @@ struct Tile {
   static constexpr std::size_t most = 16;     ///< units: two blocks of a company
   static constexpr std::size_t mostLone = 8;  ///< of a lone instance
 
-  Vec<D> quaternions[mostLone][8], parts[mostLone][8], rows[mostLone][12];  ///< blended, lone
+  /// Of a lone instance: what was blended. `rows`, then: the linearly blended vertices of both.
+  Vec<D> quaternions[mostLone][8], parts[mostLone][8], rows[mostLone][12];
   /// Of each stream four vectors: first its components, then its words.
   Vec<D> slots[most][slotCount];
   Vec<D> positions[most][3], normals[most][3], tangents[most][4];  ///< in bind pose, if morphed
   Vec<D> givenNormals[most][3], givenTangents[most][4];
-  MorphedBlock blocks[hn::MaxLanes(D())];  ///< of each instance
+  MorphedBlock block;  ///< of a lone instance
 };
 
 /// The vertices of a tile that belong to the job: `first` to `end`, counted from the tile's first.
