@@ -9,6 +9,7 @@
 #include "cpu/store_inl.h"
 #include "cpu/sums_inl.h"
 #include "cpu/vertex_inl.h"
+#include "hwy/cache_control.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace dermis::cpu::HWY_NAMESPACE {
@@ -35,38 +36,9 @@ struct Reader {
   DERMIS_INLINE Vec<D> hand() const { return loadComponent<place>(d, from.tangents, 4, 3, unit); }
 };
 
-/// The first phase: scales and shears the directions of a unit in bind space, into its slots.
-/// Returns the blended part `p`.
-template <bool tangents, From place, class D>
-DERMIS_INLINE Part<D> scaleDirections(D d, const Vec<D>* p, const Reader<place, D>& read,
-                                      bool isModerate, bool normals, Vec<D>* to) {
-  const Part<D> part = partOf<D>(p[0], p[1], p[2], p[3], p[4], p[5]);
-  if (!normals && !tangents) return part;
-  const DirectionMap<D> map = directionMap(d, part.r0, part.r1, part.r2, isModerate);
-  if (normals) {
-    const Vec3<D> given = loadThree<place>(d, read.from.givenNormals, 3, read.unit);
-    setThree(to + 4, unitOr(d, mapNormal(map, given), read.normal(), map.side));
-  }
-  if constexpr (tangents) {
-    const Vec3<D> given = loadThree<place>(d, read.from.givenTangents, 4, read.unit);
-    setThree(to + 8, unitOr(d, mapTangent(map, given), read.tangent()));
-    to[11] = hn::Mul(read.hand(), map.side);
-  }
-  return part;
-}
-
-/// Skins a unit by a blended matrix into its slots.
-template <bool tangents, class D, class Reader>
-DERMIS_INLINE void moveUnit(D d, const Matrix<D>& matrix, bool isModerate, const Reader& read,
-                            bool normals, Vec<D>* to) {
-  setThree(to, throughMatrix(matrix, read.position()));
-  if (!normals && !tangents) return;
-  const DirectionMap<D> map = directionMap(d, matrix, isModerate);
-  if (normals) setThree(to + 4, unitOr(d, mapNormal(map, read.normal()), read.normal(), map.side));
-  if constexpr (tangents) {
-    setThree(to + 8, unitOr(d, mapTangent(map, read.tangent()), read.tangent()));
-    to[11] = hn::Mul(read.hand(), map.side);
-  }
+/// How many numbers of a blended dual quaternion a method needs.
+constexpr std::size_t quaternionNumbers(Method method) {
+  return method == Method::centerOfRotation ? 4 : 8;
 }
 
 /// What the vertices of a tile are skinned by.
@@ -77,49 +49,93 @@ struct Skinning {
   bool normals;
 };
 
-/// What is blended for a unit.
-template <class D>
-struct Blended {
-  const Vec<D>*quaternion, *part, *rows;
-};
-
-/// Skins a unit into its slots. What is read is read late, and what is known is stored at once:
-/// there are few registers. `scales`: the palette has scale/shear parts.
-template <Method method, bool scales, bool tangents, From place, From mesh, class D>
-DERMIS_INLINE void skinUnit(D d, const Skinning& by, const Blended<D>& blended, std::size_t unit,
-                            Vec<D>* to) {
-  const bool isModerate = by.palette.isModerate, normals = by.normals;
-  const Reader<place, D> read{d, by.from, unit};
-  if constexpr (method == Method::linear) {
-    return moveUnit<tangents>(d, matrixOf<D>(blended.rows), isModerate, read, normals, to);
+/// Maps directions into the slots of a unit, which `normalizeUnit` normalizes. Until then, the slot
+/// after the normal has the sign of the determinant.
+template <bool tangents, From place, class D>
+DERMIS_INLINE void mapUnit(D d, const Skinning& by, const DirectionMap<D>& map,
+                           const float* normals, const float* givenTangents, std::size_t unit,
+                           Vec<D>* to) {
+  if (by.normals) {
+    setThree(to + 4, mapNormal(map, loadThree<place>(d, normals, 3, unit)));
+    to[7] = map.side;
   }
-  Part<D> part{};
-  if constexpr (scales)
-    part = scaleDirections<tangents>(d, blended.part, read, isModerate, normals, to);
-  const auto scaled = [&](const Vec3<D>& point)
-                          HWY_ATTR { return scales ? throughPart(part, point) : point; };
-  const Vec4<D> real = quadOf<D>(blended.quaternion);
-  const Vec<D> factor = turningFactor(d, real);
-  const auto move = [&](const Vec3<D>& point) HWY_ATTR {
-    return movePoint(real, quadOf<D>(blended.quaternion + 4), factor, point);
-  };
+  if constexpr (tangents) {
+    setThree(to + 8, mapTangent(map, loadThree<place>(d, givenTangents, 4, unit)));
+    to[11] = hn::Mul(Reader<place, D>{d, by.from, unit}.hand(), map.side);
+  }
+}
+template <bool tangents, From place, class D>
+DERMIS_INLINE void normalizeUnit(D d, const Skinning& by, std::size_t unit, Vec<D>* to) {
+  const Reader<place, D> read{d, by.from, unit};
+  if (by.normals) setThree(to + 4, unitOr(d, threeOf<D>(to + 4), read.normal(), to[7]));
+  if constexpr (tangents) setThree(to + 8, unitOr(d, threeOf<D>(to + 8), read.tangent()));
+}
 
-  // The second phase: rotate and translate.
-  if constexpr (method == Method::dualQuaternion || method == Method::blended) {
-    setThree(to, move(scaled(read.position())));
-  } else {
+/// Skins a unit by a blended matrix into its slots. `normalizeUnit` must follow.
+template <bool tangents, From place, class D>
+DERMIS_INLINE void moveUnit(D d, const Skinning& by, const Vec<D>* rows, std::size_t unit,
+                            Vec<D>* to) {
+  const Reader<place, D> read{d, by.from, unit};
+  const Matrix<D> matrix = matrixOf<D>(rows);
+  setThree(to, throughMatrix(matrix, read.position()));
+  if (!by.normals && !tangents) return;
+  mapUnit<tangents, place>(d, by, directionMap(d, matrix, by.palette.isModerate), by.from.normals,
+                           by.from.tangents, unit, to);
+}
+
+/// Where `scaleUnit` leaves the center of rotation. Later the slots get the previous position.
+inline constexpr std::size_t centerSlot = 12;
+
+/// The first phase: scales and shears a unit in bind space, by the blended part `p`, into its
+/// slots. With centers of rotation, the position is relative to them, or they are scaled, too.
+/// `normalizeUnit` must follow.
+template <Method method, bool tangents, From place, From mesh, class D>
+DERMIS_INLINE void scaleUnit(D d, const Skinning& by, const Vec<D>* p, std::size_t unit,
+                             Vec<D>* to) {
+  const Reader<place, D> read{d, by.from, unit};
+  const Part<D> part = partOf<D>(p[0], p[1], p[2], p[3], p[4], p[5]);
+  Vec3<D> point = read.position();
+  if constexpr (needsCentersOfRotation(method)) {
     const Vec3<D> center = loadThree<mesh>(d, by.from.centers, 3, unit);
-    const Vec3<D> straight = throughMatrix(matrixOf<D>(blended.rows), center);
     if constexpr (method == Method::centerOfRotation) {
-      const Vec3<D> point = scaled(sub3(read.position(), center));
-      setThree(to, add3(turnDirection(real, factor, point), straight));
+      point = sub3(point, center);
     } else {
-      const Vec3<D> pull = sub3(straight, move(scaled(center)));
-      const Vec<D> share = loadComponent<mesh>(d, by.from.shares, 1, 0, unit);
-      setThree(to, add3(move(scaled(read.position())), scale3(pull, share)));
+      setThree(to + centerSlot, throughPart(part, center));
     }
   }
-  if (normals) {
+  setThree(to, throughPart(part, point));
+  if (!by.normals && !tangents) return;
+  mapUnit<tangents, place>(d, by, directionMap(d, part.r0, part.r1, part.r2, by.palette.isModerate),
+                           by.from.givenNormals, by.from.givenTangents, unit, to);
+}
+
+/// The second phase: rotates and translates a unit into its slots. What is read is read late, and
+/// what is known is stored at once: there are few registers. `scales`: `scaleUnit` came before.
+template <Method method, bool scales, bool tangents, From place, From mesh, class D>
+DERMIS_INLINE void turnUnit(D d, const Skinning& by, const Vec<D>* quaternion, const Vec<D>* rows,
+                            std::size_t unit, Vec<D>* to) {
+  const Reader<place, D> read{d, by.from, unit};
+  const Vec4<D> real = quadOf<D>(quaternion);
+  const Vec<D> factor = turningFactor(d, real);
+  const auto move = [&](const Vec3<D>& point) HWY_ATTR {
+    return movePoint(real, quadOf<D>(quaternion + 4), factor, point);
+  };
+  const auto position = [&]() HWY_ATTR { return scales ? threeOf<D>(to) : read.position(); };
+  if constexpr (!needsCentersOfRotation(method)) {
+    setThree(to, move(position()));
+  } else {
+    const Vec3<D> center = loadThree<mesh>(d, by.from.centers, 3, unit);
+    const Vec3<D> straight = throughMatrix(matrixOf<D>(rows), center);
+    if constexpr (method == Method::centerOfRotation) {
+      const Vec3<D> point = scales ? threeOf<D>(to) : sub3(read.position(), center);
+      setThree(to, add3(turnDirection(real, factor, point), straight));
+    } else {
+      const Vec3<D> pull = sub3(straight, move(scales ? threeOf<D>(to + centerSlot) : center));
+      const Vec<D> share = loadComponent<mesh>(d, by.from.shares, 1, 0, unit);
+      setThree(to, add3(move(position()), scale3(pull, share)));
+    }
+  }
+  if (by.normals) {
     const Vec3<D> normal = scales ? threeOf<D>(to + 4) : read.normal();
     setThree(to + 4, turnDirection(real, factor, normal));
   }
@@ -128,11 +144,12 @@ DERMIS_INLINE void skinUnit(D d, const Skinning& by, const Blended<D>& blended, 
     setThree(to + 8, turnDirection(real, factor, tangent));
     if (!scales) to[11] = read.hand();
   }
-  if constexpr (method != Method::blended) return;
+}
 
-  // Between the linearly blended vertex and this one, whose handedness stays.
-  Vec<D> straight[12];
-  moveUnit<tangents>(d, matrixOf<D>(blended.rows), isModerate, read, normals, straight);
+/// Moves what `turnUnit` wrote towards the linearly blended vertex. The handedness stays.
+template <bool tangents, From mesh, class D>
+DERMIS_INLINE void mixUnit(D d, const Skinning& by, const Vec<D>* straight, std::size_t unit,
+                           Vec<D>* to) {
   const Vec<D> share = loadComponent<mesh>(d, by.from.shares, 1, 0, unit);
   const Vec<D> one = hn::Set(d, 1.0f), rest = hn::Sub(one, share);
   const auto isTurned = hn::Ge(share, one);
@@ -142,26 +159,8 @@ DERMIS_INLINE void skinUnit(D d, const Skinning& by, const Blended<D>& blended, 
     setThree(to + slot, choose3(isTurned, turned, isDirection ? unitOr(d, mixed, turned) : mixed));
   };
   mix(0, false);
-  if (normals) mix(4, true);
+  if (by.normals) mix(4, true);
   if constexpr (tangents) mix(8, true);
-}
-
-/// Blends what a unit needs.
-template <bool isLone, std::size_t influences, Method method, bool scales, class D>
-DERMIS_INLINE void blendUnit(D d, const Palette& palette, const Slots& slots, std::size_t unit,
-                             Vec<D>* quaternion, Vec<D>* part, Vec<D>* rows) {
-  if constexpr (needsRows(method))
-    sumUnit<isLone, influences, 12, false>(d, palette.rows, nullptr, slots.joints, slots, unit,
-                                           rows);
-  if constexpr (scales) {
-    sumUnit<isLone, influences, 6, true>(d, palette.partPairs, palette.parts, slots.pairs, slots,
-                                         unit, part);
-  }
-  constexpr std::size_t numbers = method == Method::centerOfRotation ? 4 : 8;
-  if constexpr (method != Method::linear) {
-    sumUnit<isLone, influences, numbers, false>(d, palette.pairs, nullptr, slots.pairs, slots, unit,
-                                                quaternion);
-  }
 }
 
 /// Where whole blocks are stored as soon as they are skinned: record i of instance k at `to[i][k]`.
@@ -172,21 +171,102 @@ struct Direct {
   Kept<D> kept;
 };
 
-/// Blends what units of a lone instance need, into the tile: `count` from `first` on. A loop of its
-/// own: one for all would be too long for a processor to begin a unit before the last one ends.
+/// The output of the next block, `offset` floats from `to` of each lane; or `to` is null.
+struct Ahead {
+  float* const* to;
+  std::size_t offset;
+};
+
+/// Fetches its first lines, for one lane in eight: stores would wait for all of them. No loop
+/// remains. Always inlined, and without a lambda: GCC removes calls of what only prefetches.
+template <std::size_t lines, class D>
+HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
+  constexpr std::size_t lanes = hn::MaxLanes(d), step = 8;
+  if (lanes < step && first >= lanes) return;
+  for (std::size_t lane = 0; lane < lanes; lane += step) {
+    const float* const next = ahead.to[lane + first] + ahead.offset;
+    for (std::size_t i = 0; i < lines; ++i) hwy::Prefetch(next + i * 64 / sizeof(float));
+  }
+}
+
+/// Blends what units need, into the tile: `count` from `first` on. A loop of its own: one for all
+/// would be too long for a processor to begin a unit before the last one ends.
 template <Method method, bool scales, class D>
 HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
                                      std::size_t first, std::size_t count, Tile<D>& tile) {
   const auto blend = [&](auto influences) HWY_ATTR {
     for (std::size_t i = 0; i < count; ++i) {
-      blendUnit<true, influences(), method, scales>(
-          d, palette, slots, first + i, tile.quaternions[i], tile.parts[i], tile.rows[i]);
+      if constexpr (needsRows(method))
+        sumLone<influences(), 12, false>(d, palette.rows, slots.joints, slots, first + i,
+                                         tile.rows[i]);
+      if constexpr (scales)
+        sumLone<influences(), 6, true>(d, palette.parts, slots.pairs, slots, first + i,
+                                       tile.parts[i]);
+      if constexpr (method != Method::linear)
+        sumLone<influences(), quaternionNumbers(method), false>(
+            d, palette.pairs, slots.pairs, slots, first + i, tile.quaternions[i]);
     }
   };
 #ifndef DERMIS_CPU_SMALL
   if (slots.influences == 4) return blend(std::integral_constant<std::size_t, 4>());
 #endif
   blend(std::integral_constant<std::size_t, 0>());
+}
+
+/// Skins `count` units from `first` on into slots, with what `blendLone` left in the tile, or sums
+/// for a company. In short loops, so that a processor begins a unit before the last one ends.
+template <bool isLone, Method method, bool scales, bool tangents, From place, class D>
+DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::size_t count,
+                            Ahead ahead, Tile<D>& tile, Vec<D> (*own)[slotCount]) {
+  constexpr From mesh = isLone ? From::lone : From::company;
+  const Palette& palette = by.palette;
+  const Slots& slots = by.slots;
+  const auto moveAll = [&](Vec<D>* to, std::size_t stride) HWY_ATTR {
+    for (std::size_t i = 0; i < count; ++i) {
+      Vec<D> sums[12], *const rows = isLone ? tile.rows[i] : sums;
+      if constexpr (!isLone)
+        sumCompany<12, false>(d, palette.rows, slots.joints, slots, first + i, rows);
+      moveUnit<tangents, place>(d, by, rows, first + i, to + i * stride);
+    }
+  };
+  const auto normalizeAll = [&](Vec<D>* to, std::size_t stride) HWY_ATTR {
+    for (std::size_t i = 0; (by.normals || tangents) && i < count; ++i)
+      normalizeUnit<tangents, place>(d, by, first + i, to + i * stride);
+  };
+  if constexpr (scales) {
+    for (std::size_t i = 0; i < count; ++i) {
+      Vec<D> sums[6], *const part = isLone ? tile.parts[i] : sums;
+      if constexpr (!isLone)
+        sumCompany<6, true>(d, palette.parts, slots.pairs, slots, first + i, part);
+      scaleUnit<method, tangents, place, mesh>(d, by, part, first + i, own[i]);
+    }
+    normalizeAll(own[0], slotCount);
+  }
+  if constexpr (method == Method::linear) {
+    moveAll(own[0], slotCount);
+    normalizeAll(own[0], slotCount);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if constexpr (method != Method::linear) {
+      Vec<D> sums[8], *const quaternion = isLone ? tile.quaternions[i] : sums;
+      Vec<D> more[12], *const rows = isLone ? tile.rows[i] : more;
+      if constexpr (!isLone && needsCentersOfRotation(method))
+        sumCompany<12, false>(d, palette.rows, slots.joints, slots, first + i, rows);
+      if constexpr (!isLone) {
+        sumCompany<quaternionNumbers(method), false>(d, palette.pairs, slots.pairs, slots,
+                                                     first + i, quaternion);
+      }
+      turnUnit<method, scales, tangents, place, mesh>(d, by, quaternion, rows, first + i, own[i]);
+    }
+    if (!isLone && ahead.to != nullptr) fetchLines<tangents ? 5 : 3>(d, ahead, i);
+  }
+  if constexpr (method == Method::blended) {
+    constexpr std::size_t stride = std::extent_v<decltype(tile.rows), 1>;
+    moveAll(tile.rows[0], stride);
+    normalizeAll(tile.rows[0], stride);
+    for (std::size_t i = 0; i < count; ++i)
+      mixUnit<tangents, mesh>(d, by, tile.rows[i], first + i, own[i]);
+  }
 }
 
 /// Skins units into the tile. If they are stored directly, they are those of whole blocks.
@@ -200,21 +280,11 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
   for (std::size_t first = 0; first < units; first += step) {
     const std::size_t count = isLone ? std::min(step, units - first) : step;
     Vec<D>(*const own)[slotCount] = tile.slots + (direct == nullptr ? first : 0);
-    if constexpr (isLone) {
-      blendLone<method, scales>(d, palette, by.slots, first, count, tile);
-      for (std::size_t i = 0; i < count; ++i) {
-        skinUnit<method, scales, tangents, place, From::lone>(
-            d, by, {tile.quaternions[i], tile.parts[i], tile.rows[i]}, first + i, own[i]);
-      }
-    } else {
-      for (std::size_t i = 0; i < count; ++i) {
-        Vec<D> quaternion[8], part[8], rows[12];
-        blendUnit<false, 0, method, scales>(d, palette, by.slots, first + i, quaternion, part,
-                                            rows);
-        skinUnit<method, scales, tangents, place, From::company>(d, by, {quaternion, part, rows},
-                                                                 first + i, own[i]);
-      }
-    }
+    if constexpr (isLone) blendLone<method, scales>(d, palette, by.slots, first, count, tile);
+    Ahead ahead{};
+    if (!isLone && direct != nullptr)
+      ahead = {direct->to[0], (first + blockVertices) * direct->records.all[0].slots};
+    skinSome<isLone, method, scales, tangents, place>(d, by, first, count, ahead, tile, own);
     if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
       const std::size_t vertex = (first + i) * unitVertices<isLone, D>;
@@ -226,8 +296,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
         storeDenseUnits(d, record, direct->to[number][0], own, count);
         direct->to[number][0] += count * hn::MaxLanes(d) * record.slots;
       } else {
-        storeBlock(d, record, direct->to[number], own[0]);
-        for (float*& next : direct->to[number]) next += record.slots * blockVertices;
+        storeBlock(d, record, direct->to[number], first * record.slots, own[0]);
       }
     }
   }

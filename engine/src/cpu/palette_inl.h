@@ -71,10 +71,9 @@ inline DualQuaternionArray<const T> readOnly(const DualQuaternionArray<T>& array
 /// Entries of eight numbers, those of `rows` of sixteen: floats of a lone instance, or vectors of a
 /// company, with an instance in each lane. Influences have the numbers of entries times eight.
 struct Palette {
-  const float* pairs = nullptr;      ///< dual quaternions: real and dual part
-  const float* partPairs = nullptr;  ///< scale/shear parts of pairs: the joint's minus the pivot's
-  const float* parts = nullptr;      ///< scale/shear parts of joints
-  const float* rows = nullptr;       ///< of the matrices of joints, and four unused numbers
+  const float* pairs = nullptr;  ///< dual quaternions: real and dual part
+  const float* parts = nullptr;  ///< scale/shear parts of pairs, relative to the pivot's
+  const float* rows = nullptr;   ///< of the matrices of joints, and four unused numbers
   bool scales = false;
   bool isModerate = false;  ///< result of `areModerate`, for directions
 };
@@ -107,7 +106,6 @@ DERMIS_INLINE Vec4<D> scaleRow(const Vec4<D>& row, const Vec4<D>& low, const Vec
 /// The palette of the instance at `lone` of a group.
 inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section, Method method,
                                     const Group& group, std::size_t lone, Scratch& scratch) {
-  const Four d;
   const std::span<const std::uint32_t> joints = jointsOf(mesh, section);
   const std::span<const Pair> pairs = pairsOf(mesh, section);
   Palette palette;
@@ -119,15 +117,8 @@ inline HWY_ATTR Palette makePalette(const MeshData& mesh, const Section& section
   }
   const DualQuaternionArray<float> own = group.jointsOf(lone), parts = group.partsOf(lone);
   if (palette.scales) {
-    float* const differences = floatsOf(scratch.scalePairs, (pairs.size() + joints.size()) * 8);
-    subtractPivots(pairs, readOnly(parts), differences);
-    palette.partPairs = differences;
-    float* const to = differences + pairs.size() * 8;
-    for (std::size_t joint = 0; joint < joints.size(); ++joint) {
-      const float* const from = parts.first + joint * parts.stride;
-      hn::Store(hn::LoadU(d, from), d, to + joint * 8);
-      hn::Store(hn::LoadU(d, from + parts.dual), d, to + joint * 8 + 4);
-    }
+    float* const to = floatsOf(scratch.scalePairs, pairs.size() * 8);
+    subtractPivots(pairs, readOnly(parts), to);
     palette.parts = to;
   }
   if (!needsRows(method)) return palette;
@@ -247,14 +238,16 @@ inline HWY_ATTR Palette makePalette(D d, const MeshData& mesh, const Section& se
   if (palette.scales) {
     float* to = floatsOf(scratch.scalePairs, (pairs.size() + joints.size()) * entry);
     parts = to + pairs.size() * entry;
-    palette.partPairs = to;
-    palette.parts = parts;
+    palette.parts = to;
     spreadJoints(d, members.parts, group.parts, joints.size(), parts);
     for (const Pair& pair : pairs) {
       const float *const joint = parts + pair.joint * entry, *const pivot =
                                                                  parts + pair.pivot * entry;
-      for (std::size_t i = 0; i < entry; i += hn::MaxLanes(d))
-        hn::Store(hn::Sub(hn::Load(d, joint + i), hn::Load(d, pivot + i)), d, to + i);
+      const bool isPivot = pair.joint == pair.pivot;
+      for (std::size_t i = 0; i < entry; i += hn::MaxLanes(d)) {
+        const Vec<D> part = hn::Load(d, joint + i);
+        hn::Store(isPivot ? part : hn::Sub(part, hn::Load(d, pivot + i)), d, to + i);
+      }
       to += entry;
     }
   }

@@ -227,7 +227,8 @@ inline HWY_ATTR void convertPairs(std::span<const Pair> pairs,
   }
 }
 
-/// Writes the joint's scale/shear part minus the pivot's, for each pair: eight floats each.
+/// Writes a scale/shear part for each pair: eight floats each. A pivot with itself gets what it
+/// has, and another joint the difference to it.
 inline HWY_ATTR void subtractPivots(std::span<const Pair> pairs,
                                     const DualQuaternionArray<const float>& parts, float* to) {
   const Four d;
@@ -235,7 +236,9 @@ inline HWY_ATTR void subtractPivots(std::span<const Pair> pairs,
     const float* const joint = parts.first + std::size_t{pair.joint} * parts.stride;
     const float* const pivot = parts.first + std::size_t{pair.pivot} * parts.stride;
     for (const std::size_t quad : {std::size_t{0}, parts.dual}) {
-      hn::Store(hn::Sub(hn::LoadU(d, joint + quad), hn::LoadU(d, pivot + quad)), d, to);
+      const Vec<Four> own = hn::LoadU(d, joint + quad);
+      const bool isPivot = pair.pivot == pair.joint;
+      hn::Store(isPivot ? own : hn::Sub(own, hn::LoadU(d, pivot + quad)), d, to);
       to += 4;
     }
   }

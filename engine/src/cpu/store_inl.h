@@ -92,13 +92,28 @@ DERMIS_INLINE void keepUnit(D d, const Kept<D>& kept, std::size_t offset, Vec<D>
   for (std::size_t k = 0; k < 4; ++k) slots[first + k] = hn::IfThenElse(restarts, slots[k], v[k]);
 }
 
+/// Numbers of the slots that the words of a vertex come from.
+struct Shape {
+  std::uint8_t count, slot[10];
+};
+/// Those of usual dense vertices.
+inline constexpr Shape shapes[] = {
+    {3, {0, 1, 2}},                          // float32x3
+    {6, {0, 1, 2, 4, 5, 6}},                 // with normals in float32x3
+    {10, {0, 1, 2, 4, 5, 6, 8, 9, 10, 11}},  // and tangents in float32x4
+    {9, {0, 1, 2, 4, 5, 6, 12, 13, 14}},     // or previous positions
+    {3, {0, 1, 4}},                          // float16x4 + octahedral16x2
+    {5, {0, 1, 2, 3, 4}},                    // float32x4 + octahedral16x2
+};
+
 /// Attributes that are side by side in every instance, so that they are stored at once.
 struct Record {
-  Stream stream{};                    ///< of the first
-  std::uint32_t bytes = 0;            ///< more than 4 only in whole words
-  std::uint32_t slots = 0;            ///< number of `slot`
-  bool isDense = false;               ///< whole words, and nothing between two vertices
-  std::uint8_t slot[slotCount] = {};  ///< in the order of words
+  Stream stream{};                        ///< of the first
+  std::uint32_t bytes = 0;                ///< more than 4 only in whole words
+  std::uint32_t slots = 0;                ///< number of `slot`
+  bool isDense = false;                   ///< whole words, and nothing between two vertices
+  std::size_t shape = std::size(shapes);  ///< of a company's dense vertices, if it is there
+  std::uint8_t slot[slotCount] = {};      ///< in the order of words
   /// Of eight dense vertices: how many floats after the slots of the first each word's vector is.
   std::uint16_t words[blockVertices * slotCount] = {};
 };
@@ -143,6 +158,12 @@ inline Records recordsOf(const VertexPlaces& places, const TaskInstance* const* 
     };
     record.isDense = record.bytes == places[record.stream].stride && record.bytes % 4 == 0 &&
                      std::all_of(instances, instances + instanceCount, isAligned);
+    const auto isShape = [&](const Shape& shape) {
+      return std::equal(shape.slot, shape.slot + shape.count, record.slot,
+                        record.slot + record.slots);
+    };
+    record.shape =
+        static_cast<std::size_t>(std::find_if(shapes, std::end(shapes), isShape) - shapes);
     for (std::uint32_t word = 0; lanes > 1 && word < record.slots * blockVertices; ++word) {
       const std::size_t vertex = word / record.slots;
       record.words[word] = static_cast<std::uint16_t>(
@@ -217,9 +238,53 @@ DERMIS_INLINE void storeEight(const float* const* rows, float* const* to, std::s
 #endif
 }
 
-/// Stores eight dense vertices of each instance, whose slots are given.
+/// Stores eight vertices of a shape. Without a loop, so that all places are constants.
+template <std::size_t number, class D>
+HWY_NOINLINE HWY_ATTR void storeShape(D d, float* const* to, std::size_t offset,
+                                      const Vec<D>* slots) {
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  constexpr const Shape& shape = shapes[number];
+  const auto* const numbers = reinterpret_cast<const float*>(slots);
+  float* own[lanes];
+  for (std::size_t lane = 0; lane < lanes; ++lane) own[lane] = to[lane] + offset;
+  const auto storeWords = [&](std::size_t word, std::size_t lane) HWY_ATTR {
+    const float* rows[8];
+    for (std::size_t k = 0; k < 8; ++k) {
+      const std::size_t slot = shape.slot[(word + k) % shape.count];
+      rows[k] = numbers + ((word + k) / shape.count * slotCount + slot) * lanes + lane;
+    }
+    storeEight(rows, own + lane, word);
+  };
+#pragma GCC unroll 16
+  for (std::size_t word = 0; word < shape.count * blockVertices; word += 8) {
+#pragma GCC unroll 4
+    for (std::size_t lane = 0; lane < lanes; lane += 4) storeWords(word, lane);
+  }
+}
+
+/// Stores eight dense vertices of each instance, whose slots are given: `offset` floats from `to`.
 template <class D>
-DERMIS_INLINE void storeBlock(D d, const Record& record, float* const* to, const Vec<D>* slots) {
+DERMIS_INLINE void storeBlock(D d, const Record& record, float* const* to, std::size_t offset,
+                              const Vec<D>* slots) {
+#ifndef DERMIS_CPU_SMALL
+  static_assert(std::size(shapes) == 6);
+  switch (record.shape) {
+    case 0:
+      return storeShape<0>(d, to, offset, slots);
+    case 1:
+      return storeShape<1>(d, to, offset, slots);
+    case 2:
+      return storeShape<2>(d, to, offset, slots);
+    case 3:
+      return storeShape<3>(d, to, offset, slots);
+    case 4:
+      return storeShape<4>(d, to, offset, slots);
+    case 5:
+      return storeShape<5>(d, to, offset, slots);
+    default:
+      break;
+  }
+#endif
   const auto* const numbers = reinterpret_cast<const float*>(slots);
   const std::size_t words = record.slots * blockVertices;
   for (std::size_t word = 0; word < words; word += 8) {
@@ -228,7 +293,7 @@ DERMIS_INLINE void storeBlock(D d, const Record& record, float* const* to, const
     for (std::size_t lane = 0; lane < hn::MaxLanes(d); lane += 4) {
       const float* own[8];
       for (std::size_t k = 0; k < 8; ++k) own[k] = rows[k] + lane;
-      storeEight(own, to + lane, word);
+      storeEight(own, to + lane, offset + word);
     }
   }
 }
@@ -379,11 +444,8 @@ inline HWY_ATTR void storeRecord(D d, const Record& record, std::size_t stride,
   storeSome({range.first, std::min(range.end, block)});
   float* places[lanes];
   for (std::size_t i = 0; i < lanes; ++i) places[i] = reinterpret_cast<float*>(to[i]);
-  for (std::size_t vertex = block; vertex < end; vertex += blockVertices) {
-    float* own[lanes];
-    for (std::size_t i = 0; i < lanes; ++i) own[i] = places[i] + vertex * record.slots;
-    storeBlock(d, record, own, tile.slots[vertex]);
-  }
+  for (std::size_t vertex = block; vertex < end; vertex += blockVertices)
+    storeBlock(d, record, places, vertex * record.slots, tile.slots[vertex]);
   storeSome({std::max(range.first, end), range.end});
 }
 

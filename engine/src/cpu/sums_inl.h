@@ -16,53 +16,62 @@ struct Slots {
   std::uint32_t influences;
 };
 
-// In the functions below, if entries have `pivots`, they are differences to the pivot's, which is
-// added; the first influence, the pivot itself, has none. Four influences, the usual number, take
+// In the functions below, if entries are `relative`, those of other joints are differences to the
+// pivot's, the first influence, which is added with weight 1. Two by two, so that fewer additions
+// wait for each other: (e₀ + w₁ e₁) + (w₂ e₂ + w₃ e₃) + …. Four influences, the usual number, take
 // no loop.
 
+/// Of N numbers, adds w e of one influence.
 template <std::size_t N, class D>
-DERMIS_INLINE void addEntry(D d, const float* entry, float weight, Vec<D> sum[N]) {
-  const Vec<D> w = hn::Set(d, weight);
+DERMIS_INLINE void addOne(D d, const float* entry, Vec<D> w, Vec<D>* sum) {
   for (std::size_t k = 0; k < N; ++k)
     sum[k] = hn::Add(sum[k], hn::Mul(w, hn::Load(d, entry + k * hn::MaxLanes(d))));
 }
+/// Of two influences.
+template <std::size_t N, class D>
+DERMIS_INLINE void addTwo(D d, const float* entry, Vec<D> w, const float* other, Vec<D> v,
+                          Vec<D>* sum) {
+  for (std::size_t k = 0; k < N; ++k) {
+    const std::size_t place = k * hn::MaxLanes(d);
+    sum[k] = hn::Add(sum[k], hn::Add(hn::Mul(w, hn::Load(d, entry + place)),
+                                     hn::Mul(v, hn::Load(d, other + place))));
+  }
+}
 
 /// Σ w e of unit `unit` of a company: the first N numbers of entries of 8 or, if N > 8, 16.
-template <std::size_t N, bool hasPivots, class D>
-DERMIS_INLINE void sumCompany(D d, const float* entries, const float* pivots,
-                              const std::uint16_t* HWY_RESTRICT numbers, const Slots& slots,
-                              std::size_t unit, Vec<D>* sums) {
+template <std::size_t N, bool relative, class D>
+DERMIS_INLINE void sumCompany(D d, const float* entries, const std::uint16_t* HWY_RESTRICT numbers,
+                              const Slots& slots, std::size_t unit, Vec<D>* sums) {
   constexpr std::size_t lanes = hn::MaxLanes(d), stride = (N > 8 ? 2 : 1) * lanes;
-  constexpr std::size_t begin = hasPivots ? 1 : 0;
   const std::size_t count = slots.influences;
   const float* const HWY_RESTRICT weights = slots.weights + unit * count;
   const std::uint16_t* const HWY_RESTRICT own = numbers + unit * count;
+  const float* const first = entries + own[0] * stride;
   Vec<D> sum[N];
-  if (begin < count) {
-    const float* const entry = entries + own[begin] * stride;
-    const Vec<D> w = hn::Set(d, weights[begin]);
-    for (std::size_t k = 0; k < N; ++k) sum[k] = hn::Mul(w, hn::Load(d, entry + k * lanes));
-  } else {
-    for (Vec<D>& value : sum) value = hn::Zero(d);
+  for (std::size_t k = 0; k < N; ++k) {
+    sum[k] = hn::Load(d, first + k * lanes);
+    if (!relative) sum[k] = hn::Mul(hn::Set(d, weights[0]), sum[k]);
   }
+  const auto one = [&](std::size_t i) HWY_ATTR {
+    addOne<N>(d, entries + own[i] * stride, hn::Set(d, weights[i]), sum);
+  };
+  const auto two = [&](std::size_t i) HWY_ATTR {
+    addTwo<N>(d, entries + own[i] * stride, hn::Set(d, weights[i]), entries + own[i + 1] * stride,
+              hn::Set(d, weights[i + 1]), sum);
+  };
 #ifndef DERMIS_CPU_SMALL
   if (count == 4) {
-    addEntry<N>(d, entries + own[begin + 1] * stride, weights[begin + 1], sum);
-    addEntry<N>(d, entries + own[begin + 2] * stride, weights[begin + 2], sum);
-    if constexpr (!hasPivots) addEntry<N>(d, entries + own[3] * stride, weights[3], sum);
+    one(1);
+    two(2);
   } else
 #endif
-  {
-    for (std::size_t i = begin + 1; i < count; ++i)
-      addEntry<N>(d, entries + own[i] * stride, weights[i], sum);
+      if (count > 1) {
+    one(1);
+    std::size_t i = 2;
+    for (; i + 1 < count; i += 2) two(i);
+    if (i < count) one(i);
   }
-  for (std::size_t k = 0; k < N; ++k) {
-    if constexpr (hasPivots) {
-      const float* const pivot = pivots + slots.joints[unit * count] * lanes;
-      sum[k] = hn::Add(hn::Load(d, pivot + k * lanes), sum[k]);
-    }
-    sums[k] = sum[k];
-  }
+  for (std::size_t k = 0; k < N; ++k) sums[k] = sum[k];
 }
 
 #if HWY_MAX_BYTES >= 32
@@ -78,29 +87,27 @@ DERMIS_INLINE void columnsOf(Eight d, const Vec<Eight> rows[8], Vec<Eight> colum
 #endif
 
 /// Σ w e of a vertex of a lone instance: as many numbers of an entry as D has lanes.
-template <std::size_t influences, std::size_t units, bool hasPivots, class D>
-DERMIS_INLINE Vec<D> sumVertex(D d, const float* entries, const float* pivots,
-                               const std::uint16_t* numbers, const Slots& slots,
-                               std::size_t vertex) {
-  constexpr std::size_t begin = hasPivots ? 1 : 0;
+template <std::size_t influences, std::size_t units, bool relative, class D>
+DERMIS_INLINE Vec<D> sumVertex(D d, const float* entries, const std::uint16_t* numbers,
+                               const Slots& slots, std::size_t vertex) {
   const std::size_t count = influences != 0 ? influences : slots.influences;
   const std::size_t first = vertex * count;
-  Vec<D> sum = hn::Zero(d);
-  for (std::size_t i = begin; i < count; ++i) {
-    const Vec<D> part = hn::Mul(hn::Set(d, slots.weights[first + i]),
-                                hn::Load(d, entries + numbers[first + i] * units));
-    sum = i == begin ? part : hn::Add(sum, part);
-  }
-  if constexpr (hasPivots) sum = hn::Add(hn::Load(d, pivots + slots.joints[first]), sum);
-  return sum;
+  const auto term = [&](std::size_t i) HWY_ATTR {
+    return hn::Mul(hn::Set(d, slots.weights[first + i]),
+                   hn::Load(d, entries + numbers[first + i] * units));
+  };
+  Vec<D> sum = relative ? hn::Load(d, entries + numbers[first] * units) : term(0);
+  if (count > 1) sum = hn::Add(sum, term(1));
+  std::size_t i = 2;
+  for (; i + 1 < count; i += 2) sum = hn::Add(sum, hn::Add(term(i), term(i + 1)));
+  return i < count ? hn::Add(sum, term(i)) : sum;
 }
 
 /// As `sumCompany`, of as many vertices of a lone instance as there are lanes. Writes the numbers
 /// of whole quads.
-template <std::size_t influences, std::size_t N, bool hasPivots, class D>
-DERMIS_INLINE void sumLone(D d, const float* entries, const float* pivots,
-                           const std::uint16_t* numbers, const Slots& slots, std::size_t unit,
-                           Vec<D>* sums) {
+template <std::size_t influences, std::size_t N, bool relative, class D>
+DERMIS_INLINE void sumLone(D d, const float* entries, const std::uint16_t* numbers,
+                           const Slots& slots, std::size_t unit, Vec<D>* sums) {
   constexpr std::size_t lanes = hn::MaxLanes(d), units = N > 8 ? 2 : 1;
   const std::size_t first = unit * lanes;
   const Four four;
@@ -109,16 +116,15 @@ DERMIS_INLINE void sumLone(D d, const float* entries, const float* pivots,
   for (std::size_t k = 0; k < wide; k += 8) {
     Vec<D> rows[8];
     for (std::size_t i = 0; i < 8; ++i) {
-      rows[i] = sumVertex<influences, units, hasPivots>(d, entries + k, pivots, numbers, slots,
-                                                        first + i);
+      rows[i] = sumVertex<influences, units, relative>(d, entries + k, numbers, slots, first + i);
     }
     columnsOf(d, rows, sums + k);
   }
   if constexpr (wide < N) {
     Vec<Four> rows[8];
     for (std::size_t i = 0; i < 8; ++i) {
-      rows[i] = sumVertex<influences, units, hasPivots>(four, entries + wide, pivots, numbers,
-                                                        slots, first + i);
+      rows[i] =
+          sumVertex<influences, units, relative>(four, entries + wide, numbers, slots, first + i);
     }
     Vec<D>* const own = sums + wide;
     for (std::size_t i = 0; i < 4; ++i) own[i] = hn::Combine(d, rows[i + 4], rows[i]);
@@ -127,26 +133,12 @@ DERMIS_INLINE void sumLone(D d, const float* entries, const float* pivots,
 #else
   for (std::size_t k = 0; k < N; k += 4) {
     Vec<D>* const own = sums + k;
-    const float* const pivot = hasPivots ? pivots + k : nullptr;
     for (std::size_t i = 0; i < 4; ++i) {
-      own[i] = sumVertex<influences, units, hasPivots>(four, entries + k, pivot, numbers, slots,
-                                                       first + i);
+      own[i] = sumVertex<influences, units, relative>(four, entries + k, numbers, slots, first + i);
     }
     transpose4(d, own[0], own[1], own[2], own[3]);
   }
 #endif
-}
-
-/// The sums of a unit of either. `influences`: of a lone instance, if it is a constant, or 0.
-template <bool isLone, std::size_t influences, std::size_t N, bool hasPivots, class D>
-DERMIS_INLINE void sumUnit(D d, const float* entries, const float* pivots,
-                           const std::uint16_t* numbers, const Slots& slots, std::size_t unit,
-                           Vec<D>* sums) {
-  if constexpr (isLone) {
-    sumLone<influences, N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
-  } else {
-    sumCompany<N, hasPivots>(d, entries, pivots, numbers, slots, unit, sums);
-  }
 }
 
 }  // namespace dermis::cpu::HWY_NAMESPACE

@@ -27,7 +27,8 @@ DERMIS_INLINE Vec3<D> movePoint(const Vec4<D>& q, const Vec4<D>& dual, Vec<D> fa
 
 template <class D>
 DERMIS_INLINE Vec<D> turningFactor(D d, const Vec4<D>& q) {
-  const Vec<D> square = hn::Add(dot3(q.x, q.y, q.z, q.x, q.y, q.z), hn::Mul(q.w, q.w));
+  const Vec<D> square = hn::Add(hn::Add(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y)),
+                                hn::Add(hn::Mul(q.z, q.z), hn::Mul(q.w, q.w)));
   return hn::Div(hn::Set(d, 2.0f), square);
 }
 
