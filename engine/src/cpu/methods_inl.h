@@ -163,7 +163,8 @@ DERMIS_INLINE void mixUnit(D d, const Skinning& by, const Vec<D>* straight, std:
   if constexpr (tangents) mix(8, true);
 }
 
-/// Where whole blocks are stored as soon as they are skinned: record i of instance k at `to[i][k]`.
+/// Where whole blocks are stored as soon as they are skinned: record i of the mesh's first vertex,
+/// of instance k, at `to[i][k]`.
 template <class D>
 struct Direct {
   const Records& records;
@@ -189,8 +190,8 @@ HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
   }
 }
 
-/// Blends what units need, into the tile: `count` from `first` on. A loop of its own: one for all
-/// would be too long for a processor to begin a unit before the last one ends.
+/// Blends what `count` units of a lone instance from `first` on need, into the tile. A loop of its
+/// own: one for all would be too long for a processor to begin a unit before the last one ends.
 template <Method method, bool scales, class D>
 HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
                                      std::size_t first, std::size_t count, Tile<D>& tile) {
@@ -269,10 +270,11 @@ DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::siz
   }
 }
 
-/// Skins units into the tile. If they are stored directly, they are those of whole blocks.
+/// Skins units into the tile. If they are stored directly, they are those of whole blocks, the
+/// first of which begins at `vertex`.
 template <bool isLone, Method method, bool scales, bool tangents, From place, class D>
 HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t units,
-                                     Direct<D>* direct, Tile<D>& tile) {
+                                     const Direct<D>* direct, std::size_t vertex, Tile<D>& tile) {
   // Copies, which stores into the tile cannot change.
   const Palette palette = given.palette;
   const Skinning by{palette, given.slots, given.from, given.normals};
@@ -283,20 +285,20 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
     if constexpr (isLone) blendLone<method, scales>(d, palette, by.slots, first, count, tile);
     Ahead ahead{};
     if (!isLone && direct != nullptr)
-      ahead = {direct->to[0], (first + blockVertices) * direct->records.all[0].slots};
+      ahead = {direct->to[0], (vertex + first + blockVertices) * direct->records.all[0].slots};
     skinSome<isLone, method, scales, tangents, place>(d, by, first, count, ahead, tile, own);
     if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
-      const std::size_t vertex = (first + i) * unitVertices<isLone, D>;
-      keepUnit(d, direct->kept, vertex * direct->kept.stride, own[i]);
+      const std::size_t number = vertex + (first + i) * unitVertices<isLone, D>;
+      keepUnit(d, direct->kept, number * direct->kept.stride, own[i]);
     }
     for (std::size_t number = 0; number < direct->records.count; ++number) {
       const Record& record = direct->records.all[number];
+      const std::size_t offset = (vertex + first * unitVertices<isLone, D>)*record.slots;
       if constexpr (isLone) {
-        storeDenseUnits(d, record, direct->to[number][0], own, count);
-        direct->to[number][0] += count * hn::MaxLanes(d) * record.slots;
+        storeDenseUnits(d, record, direct->to[number][0] + offset, own, count);
       } else {
-        storeBlock(d, record, direct->to[number], first * record.slots, own[0]);
+        storeBlock(d, record, direct->to[number], offset, own[0]);
       }
     }
   }

@@ -130,6 +130,19 @@ inline HWY_ATTR Kept<D> keptOf(D d, const Together& together, std::size_t vertex
   return kept;
 }
 
+template <bool isLone, class D>
+inline HWY_ATTR Direct<D> directOf(D d, const Together& together) {
+  Direct<D> direct{together.common.records, {}, {}};
+  if (direct.records.keepsPositions) direct.kept = keptOf<isLone>(d, together, 0);
+  for (std::size_t i = 0; i < direct.records.count; ++i) {
+    for (std::size_t lane = 0; lane < (isLone ? 1 : hn::MaxLanes(d)); ++lane) {
+      direct.to[i][lane] =
+          reinterpret_cast<float*>(together.instances[lane]->outputs[direct.records.all[i].stream]);
+    }
+  }
+  return direct;
+}
+
 /// Encodes the attributes of a tile that begins at `vertex`, and stores them.
 template <bool isLone, class D>
 inline HWY_ATTR void storeTile(D d, const Together& together, std::size_t vertex, std::size_t units,
@@ -197,12 +210,12 @@ inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& block
   if (together.common.isMorphed) {
     morphTile<isLone>(d, *task.mesh, blocks.first, blocks.end, together.morphs, tile, by.from);
   }
-  Direct<D>* const none = nullptr;
+  const Direct<D>* const none = nullptr;
   byMethod(task, by.palette.scales, [&](auto method, auto scales, auto tangents) HWY_ATTR {
     by.from.isTile
-        ? skinUnits<isLone, method(), scales(), tangents(), From::tile>(d, by, units, none, tile)
+        ? skinUnits<isLone, method(), scales(), tangents(), From::tile>(d, by, units, none, 0, tile)
         : skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(d, by, units, none,
-                                                                                 tile);
+                                                                                 0, tile);
   });
   if (together.common.hasResults) findBounds<isLone>(d, tile, units, range, findings);
   if (isSnormPosition(task.places[Stream::positions].format))
@@ -212,8 +225,9 @@ inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& block
 
 /// Skins the vertices of a run that are in the range: whole blocks directly.
 template <bool isLone, class D>
-inline HWY_ATTR void skinDirectly(D d, const Together& together, const Blocks& blocks,
-                                  const VertexRange& range, Tile<D>& tile, Findings<D>& findings) {
+inline HWY_ATTR void skinDirectly(D d, const Together& together, const Direct<D>& direct,
+                                  const Blocks& blocks, const VertexRange& range, Tile<D>& tile,
+                                  Findings<D>& findings) {
   const auto whole = static_cast<std::uint32_t>((range.first + blockVertices - 1) / blockVertices);
   const auto end = static_cast<std::uint32_t>(range.end / blockVertices);
   const auto skinPart = [&](std::uint32_t block, std::size_t first, std::size_t last) HWY_ATTR {
@@ -224,22 +238,12 @@ inline HWY_ATTR void skinDirectly(D d, const Together& together, const Blocks& b
     skinPart(0, range.first, std::min<std::size_t>(range.end, blockVertices));
   if (whole < end) {
     const std::uint32_t block = blocks.first + whole;
-    Direct<D> direct{together.common.records, {}, {}};
-    if (together.common.records.keepsPositions)
-      direct.kept = keptOf<isLone>(d, together, std::size_t{block} * blockVertices);
-    for (std::size_t i = 0; i < together.common.records.count; ++i) {
-      const Record& record = together.common.records.all[i];
-      for (std::size_t lane = 0; lane < (isLone ? 1 : hn::MaxLanes(d)); ++lane) {
-        direct.to[i][lane] =
-            reinterpret_cast<float*>(together.instances[lane]->outputs[record.stream]) +
-            std::size_t{block} * blockVertices * record.slots;
-      }
-    }
     const Skinning by = skinningOf(together, blocks.run, block);
     byMethod(together.task, by.palette.scales,
              [&](auto method, auto scales, auto tangents) HWY_ATTR {
                skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(
-                   d, by, (end - whole) * unitsOf<isLone, D>, &direct, tile);
+                   d, by, (end - whole) * unitsOf<isLone, D>, &direct,
+                   std::size_t{block} * blockVertices, tile);
              });
   }
   if (end >= whole && range.end != std::size_t{end} * blockVertices)
