@@ -130,6 +130,7 @@ inline HWY_ATTR Kept<D> keptOf(D d, const Together& together, std::size_t vertex
   return kept;
 }
 
+/// Where blocks of all runs of the mesh are stored directly.
 template <bool isLone, class D>
 inline HWY_ATTR Direct<D> directOf(D d, const Together& together) {
   Direct<D> direct{together.common.records, {}, {}};
