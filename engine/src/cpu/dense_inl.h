@@ -28,6 +28,7 @@ DERMIS_INLINE void storeChunks(Eight d, const Vec<Eight> (&chunks)[count], float
   }
 }
 #endif
+
 /// Stores the words of four vertices, each word in a lane of every block. Comments below show what
 /// is in a block: two words of a vertex and its number.
 template <std::size_t count, class D>

@@ -167,6 +167,7 @@ DERMIS_INLINE void mixUnit(D d, const Skinning& by, const Vec<D>* straight, std:
 /// of instance k, at `to[i][k]`.
 template <class D>
 struct Direct {
+  const VertexPlaces& places;
   const Records& records;
   float* to[streamCount][hn::MaxLanes(D())];
   Kept<D> kept;
@@ -176,17 +177,19 @@ struct Direct {
 struct Ahead {
   float* const* to;
   std::size_t offset;
+  bool isLong;  ///< a block has more than three cache lines
 };
 
-/// Fetches its first lines, for one lane in eight: stores would wait for all of them. No loop
-/// remains. Always inlined, and without a lambda: GCC removes calls of what only prefetches.
-template <std::size_t lines, class D>
+/// Fetches its lines, for one lane in eight: stores would wait for all of them. No loop remains.
+/// Always inlined, and without a lambda: GCC removes calls of what only prefetches.
+template <class D>
 HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
-  constexpr std::size_t lanes = hn::MaxLanes(d), step = 8;
+  constexpr std::size_t lanes = hn::MaxLanes(d), step = 8, floats = 64 / sizeof(float);
   if (lanes < step && first >= lanes) return;
   for (std::size_t lane = 0; lane < lanes; lane += step) {
     const float* const next = ahead.to[lane + first] + ahead.offset;
-    for (std::size_t i = 0; i < lines; ++i) hwy::Prefetch(next + i * 64 / sizeof(float));
+    for (std::size_t i = 0; i < 3; ++i) hwy::Prefetch(next + i * floats);
+    for (std::size_t i = 3; ahead.isLong && i < 5; ++i) hwy::Prefetch(next + i * floats);
   }
 }
 
@@ -259,7 +262,7 @@ DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::siz
       }
       turnUnit<method, scales, tangents, place, mesh>(d, by, quaternion, rows, first + i, own[i]);
     }
-    if (!isLone && ahead.to != nullptr) fetchLines<tangents ? 5 : 3>(d, ahead, i);
+    if (!isLone && ahead.to != nullptr) fetchLines(d, ahead, i);
   }
   if constexpr (method == Method::blended) {
     constexpr std::size_t stride = std::extent_v<decltype(tile.rows), 1>;
@@ -284,10 +287,13 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
     Vec<D>(*const own)[slotCount] = tile.slots + (direct == nullptr ? first : 0);
     if constexpr (isLone) blendLone<method, scales>(d, palette, by.slots, first, count, tile);
     Ahead ahead{};
-    if (!isLone && direct != nullptr)
-      ahead = {direct->to[0], (vertex + first + blockVertices) * direct->records.all[0].slots};
+    if (!isLone && direct != nullptr) {
+      const std::size_t slots = direct->records.all[0].slots;
+      ahead = {direct->to[0], (vertex + first + blockVertices) * slots, slots > 6};
+    }
     skinSome<isLone, method, scales, tangents, place>(d, by, first, count, ahead, tile, own);
     if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
+    encodeUnits(d, direct->places, count, own);
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
       const std::size_t number = vertex + (first + i) * unitVertices<isLone, D>;
       keepUnit(d, direct->kept, number * direct->kept.stride, own[i]);

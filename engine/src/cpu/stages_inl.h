@@ -27,7 +27,7 @@ struct Blocks {
 struct Common {
   Records records;
   bool isMorphed, hasResults;
-  /// Whether vertices are stored as they are skinned, in whole blocks: there is no other stage.
+  /// Whether vertices are encoded and stored as they are skinned, in whole blocks.
   bool isDirect;
 
   /// `lanes`: of a company, or 1.
@@ -38,9 +38,8 @@ struct Common {
         hasResults(
             std::any_of(instances, instances + count,
                         [](const TaskInstance* instance) { return instance->result != nullptr; })),
-        isDirect(!isMorphed && !hasResults && task.places.hasMotion() == records.keepsPositions) {
-    for (const Stream stream : {Stream::positions, Stream::normals, Stream::tangents})
-      isDirect = isDirect && !isEncoded(stream, task.places[stream].format);
+        isDirect(!isMorphed && !hasResults && task.places.hasMotion() == records.keepsPositions &&
+                 !isSnormPosition(task.places[Stream::positions].format)) {
     for (const Record& record : std::span(records.all).first(records.count)) {
       isDirect = isDirect && record.isDense && (lanes > 1 || byDenseSize(record, [](auto) {}));
     }
@@ -133,7 +132,7 @@ inline HWY_ATTR Kept<D> keptOf(D d, const Together& together, std::size_t vertex
 /// Where blocks of all runs of the mesh are stored directly.
 template <bool isLone, class D>
 inline HWY_ATTR Direct<D> directOf(D d, const Together& together) {
-  Direct<D> direct{together.common.records, {}, {}};
+  Direct<D> direct{together.task.places, together.common.records, {}, {}};
   if (direct.records.keepsPositions) direct.kept = keptOf<isLone>(d, together, 0);
   for (std::size_t i = 0; i < direct.records.count; ++i) {
     for (std::size_t lane = 0; lane < (isLone ? 1 : hn::MaxLanes(d)); ++lane) {
@@ -149,13 +148,7 @@ template <bool isLone, class D>
 inline HWY_ATTR void storeTile(D d, const Together& together, std::size_t vertex, std::size_t units,
                                const VertexRange& range, Tile<D>& tile) {
   const VertexPlaces& places = together.task.places;
-  const auto encode = [&](auto stream) HWY_ATTR {
-    if (isEncoded(stream(), places[stream()].format))
-      encodeUnits<stream()>(d, places[stream()].format, units, tile);
-  };
-  encode(std::integral_constant<Stream, Stream::positions>());
-  encode(std::integral_constant<Stream, Stream::normals>());
-  encode(std::integral_constant<Stream, Stream::tangents>());
+  encodeUnits(d, places, units, tile.slots);
   // The previous positions are those in the output, or those that are stored now.
   const auto copyPositions = [&](bool restart) HWY_ATTR {
     if (!places.hasMotion() || together.common.records.keepsPositions) return;

@@ -22,9 +22,10 @@ inline bool isEncoded(Stream stream, VertexFormat format) {
 
 /// Replaces the components of an attribute by its words.
 template <Stream stream, class D>
-HWY_NOINLINE HWY_ATTR void encodeUnits(D d, VertexFormat format, std::size_t units, Tile<D>& tile) {
+HWY_NOINLINE HWY_ATTR void encodeStream(D d, VertexFormat format, std::size_t units,
+                                        Vec<D> (*slots)[slotCount]) {
   for (std::size_t unit = 0; unit < units; ++unit) {
-    Vec<D>* const own = tile.slots[unit] + static_cast<std::size_t>(stream) * 4;
+    Vec<D>* const own = slots[unit] + static_cast<std::size_t>(stream) * 4;
     const Vec3<D> v{own[0], own[1], own[2]};
     Encoded<D> encoded;
     if constexpr (stream == Stream::positions) {
@@ -36,6 +37,19 @@ HWY_NOINLINE HWY_ATTR void encodeUnits(D d, VertexFormat format, std::size_t uni
     }
     for (std::size_t k = 0; k < 4; ++k) own[k] = hn::BitCast(d, encoded.words[k]);
   }
+}
+
+/// Replaces the components of all attributes by their words.
+template <class D>
+DERMIS_INLINE void encodeUnits(D d, const VertexPlaces& places, std::size_t units,
+                               Vec<D> (*slots)[slotCount]) {
+  const auto encode = [&](auto stream) HWY_ATTR {
+    if (isEncoded(stream(), places[stream()].format))
+      encodeStream<stream()>(d, places[stream()].format, units, slots);
+  };
+  encode(std::integral_constant<Stream, Stream::positions>());
+  encode(std::integral_constant<Stream, Stream::normals>());
+  encode(std::integral_constant<Stream, Stream::tangents>());
 }
 
 /// Copies the positions of vertices `first` to `end` to their previous positions.
