@@ -18,6 +18,19 @@ struct Source {
   const float *givenNormals = nullptr, *givenTangents = nullptr;
   const float *centers = nullptr, *shares = nullptr;
   bool isTile = false;  ///< the tile has them, but not centers and shares
+
+  /// Goes on by some numbers of each component, and by some vertices of the mesh.
+  void advance(std::size_t numbers, std::size_t vertices) {
+    const auto move = [](const float*& place, std::size_t floats) {
+      if (place != nullptr) place += floats;
+    };
+    for (const float** const place : {&positions, &normals, &givenNormals})
+      move(*place, 3 * numbers);
+    move(tangents, 4 * numbers);
+    move(givenTangents, 4 * numbers);
+    move(centers, 3 * vertices);
+    move(shares, vertices);
+  }
 };
 
 /// How the vertices of a unit are read.

@@ -16,7 +16,12 @@ namespace dermis::cpu::HWY_NAMESPACE {
 
 template <class D>
 DERMIS_INLINE Vec4<D> quadOf(const Vec<D>* v) {
-  return {v[0], v[1], v[2], v[3]};
+  // Not copied as a structure, which GCC might store again.
+  const auto* const numbers = reinterpret_cast<const float*>(v);
+  const D d;
+  constexpr std::size_t lanes = hn::MaxLanes(d);
+  return {hn::Load(d, numbers), hn::Load(d, numbers + lanes), hn::Load(d, numbers + 2 * lanes),
+          hn::Load(d, numbers + 3 * lanes)};
 }
 template <class D>
 DERMIS_INLINE Matrix<D> matrixOf(const Vec<D>* v) {
@@ -47,6 +52,14 @@ struct Skinning {
   Slots slots;
   Source from;
   bool normals;
+
+  /// Goes on by some units, which are those of whole blocks.
+  template <bool isLone, From place, class D>
+  DERMIS_INLINE void advance(D, std::size_t units) {
+    const std::size_t vertices = units * unitVertices<isLone, D>;
+    slots.advance(vertices);
+    from.advance(place == From::tile ? units * hn::MaxLanes(D()) : vertices, vertices);
+  }
 };
 
 /// Maps directions into the slots of a unit, which `normalizeUnit` normalizes. Until then, the slot
@@ -117,12 +130,9 @@ DERMIS_INLINE void turnUnit(D d, const Skinning& by, const Vec<D>* quaternion, c
   const Reader<place, D> read{d, by.from, unit};
   const Vec4<D> real = quadOf<D>(quaternion);
   const Vec<D> factor = turningFactor(d, real);
-  const auto move = [&](const Vec3<D>& point) HWY_ATTR {
-    return movePoint(real, quadOf<D>(quaternion + 4), factor, point);
-  };
-  const auto position = [&]() HWY_ATTR { return scales ? threeOf<D>(to) : read.position(); };
+  const Vec4<D> dual = quadOf<D>(quaternion + 4);
   if constexpr (!needsCentersOfRotation(method)) {
-    setThree(to, move(position()));
+    setThree(to, movePoint(real, dual, factor, scales ? threeOf<D>(to) : read.position()));
   } else {
     const Vec3<D> center = loadThree<mesh>(d, by.from.centers, 3, unit);
     const Vec3<D> straight = throughMatrix(matrixOf<D>(rows), center);
@@ -130,9 +140,12 @@ DERMIS_INLINE void turnUnit(D d, const Skinning& by, const Vec<D>* quaternion, c
       const Vec3<D> point = scales ? threeOf<D>(to) : sub3(read.position(), center);
       setThree(to, add3(turnDirection(real, factor, point), straight));
     } else {
-      const Vec3<D> pull = sub3(straight, move(scales ? threeOf<D>(to + centerSlot) : center));
+      const Vec3<D> turned =
+          movePoint(real, dual, factor, scales ? threeOf<D>(to + centerSlot) : center);
+      const Vec3<D> moved =
+          movePoint(real, dual, factor, scales ? threeOf<D>(to) : read.position());
       const Vec<D> share = loadComponent<mesh>(d, by.from.shares, 1, 0, unit);
-      setThree(to, add3(move(position()), scale3(pull, share)));
+      setThree(to, add3(moved, scale3(sub3(straight, turned), share)));
     }
   }
   if (by.normals) {
@@ -180,13 +193,13 @@ struct Ahead {
   bool isLong;  ///< a block has more than three cache lines
 };
 
-/// Fetches its lines, for one lane in eight: stores would wait for all of them. No loop remains.
-/// Always inlined, and without a lambda: GCC removes calls of what only prefetches.
+/// Fetches its lines, for one lane in eight: stores would wait for all of them. Those of four lanes
+/// do not wait. No loop remains. Always inlined, and without a lambda: GCC removes calls of what
+/// only prefetches.
 template <class D>
 HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
-  constexpr std::size_t lanes = hn::MaxLanes(d), step = 8, floats = 64 / sizeof(float);
-  if (lanes < step && first >= lanes) return;
-  for (std::size_t lane = 0; lane < lanes; lane += step) {
+  constexpr std::size_t step = 8, floats = 64 / sizeof(float);
+  for (std::size_t lane = 0; lane + step <= hn::MaxLanes(d); lane += step) {
     const float* const next = ahead.to[lane + first] + ahead.offset;
     for (std::size_t i = 0; i < 3; ++i) hwy::Prefetch(next + i * floats);
     for (std::size_t i = 3; ahead.isLong && i < 5; ++i) hwy::Prefetch(next + i * floats);
@@ -197,18 +210,16 @@ HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
 /// own: one for all would be too long for a processor to begin a unit before the last one ends.
 template <Method method, bool scales, class D>
 HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
-                                     std::size_t first, std::size_t count, Tile<D>& tile) {
+                                     std::size_t count, Tile<D>& tile) {
   const auto blend = [&](auto influences) HWY_ATTR {
     for (std::size_t i = 0; i < count; ++i) {
       if constexpr (needsRows(method))
-        sumLone<influences(), 12, false>(d, palette.rows, slots.joints, slots, first + i,
-                                         tile.rows[i]);
+        sumLone<influences(), 12, false>(d, palette.rows, slots.joints, slots, i, tile.rows[i]);
       if constexpr (scales)
-        sumLone<influences(), 6, true>(d, palette.parts, slots.pairs, slots, first + i,
-                                       tile.parts[i]);
+        sumLone<influences(), 6, true>(d, palette.parts, slots.pairs, slots, i, tile.parts[i]);
       if constexpr (method != Method::linear)
-        sumLone<influences(), quaternionNumbers(method), false>(
-            d, palette.pairs, slots.pairs, slots, first + i, tile.quaternions[i]);
+        sumLone<influences(), quaternionNumbers(method), false>(d, palette.pairs, slots.pairs,
+                                                                slots, i, tile.quaternions[i]);
     }
   };
 #ifndef DERMIS_CPU_SMALL
@@ -217,32 +228,30 @@ HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& s
   blend(std::integral_constant<std::size_t, 0>());
 }
 
-/// Skins `count` units from `first` on into slots, with what `blendLone` left in the tile, or sums
-/// for a company. In short loops, so that a processor begins a unit before the last one ends.
+/// Skins `count` units into slots, with what `blendLone` left in the tile, or sums for a company. In
+/// short loops, so that a processor begins a unit before the last one ends.
 template <bool isLone, Method method, bool scales, bool tangents, From place, class D>
-DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::size_t count,
-                            Ahead ahead, Tile<D>& tile, Vec<D> (*own)[slotCount]) {
+DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t count, Ahead ahead, Tile<D>& tile,
+                            Vec<D> (*own)[slotCount]) {
   constexpr From mesh = isLone ? From::lone : From::company;
   const Palette& palette = by.palette;
   const Slots& slots = by.slots;
   const auto moveAll = [&](Vec<D>* to, std::size_t stride) HWY_ATTR {
     for (std::size_t i = 0; i < count; ++i) {
       Vec<D> sums[12], *const rows = isLone ? tile.rows[i] : sums;
-      if constexpr (!isLone)
-        sumCompany<12, false>(d, palette.rows, slots.joints, slots, first + i, rows);
-      moveUnit<tangents, place>(d, by, rows, first + i, to + i * stride);
+      if constexpr (!isLone) sumCompany<12, false>(d, palette.rows, slots.joints, slots, i, rows);
+      moveUnit<tangents, place>(d, by, rows, i, to + i * stride);
     }
   };
   const auto normalizeAll = [&](Vec<D>* to, std::size_t stride) HWY_ATTR {
     for (std::size_t i = 0; (by.normals || tangents) && i < count; ++i)
-      normalizeUnit<tangents, place>(d, by, first + i, to + i * stride);
+      normalizeUnit<tangents, place>(d, by, i, to + i * stride);
   };
   if constexpr (scales) {
     for (std::size_t i = 0; i < count; ++i) {
       Vec<D> sums[6], *const part = isLone ? tile.parts[i] : sums;
-      if constexpr (!isLone)
-        sumCompany<6, true>(d, palette.parts, slots.pairs, slots, first + i, part);
-      scaleUnit<method, tangents, place, mesh>(d, by, part, first + i, own[i]);
+      if constexpr (!isLone) sumCompany<6, true>(d, palette.parts, slots.pairs, slots, i, part);
+      scaleUnit<method, tangents, place, mesh>(d, by, part, i, own[i]);
     }
     normalizeAll(own[0], slotCount);
   }
@@ -250,17 +259,23 @@ DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::siz
     moveAll(own[0], slotCount);
     normalizeAll(own[0], slotCount);
   }
+  // With four lanes, sums are a loop of their own, too: they load, what follows computes.
+  constexpr bool isSummed = isLone || (hn::MaxLanes(d) < 8 && !needsCentersOfRotation(method));
+  if constexpr (!isLone && isSummed && method != Method::linear) {
+    for (std::size_t i = 0; i < count; ++i)
+      sumCompany<8, false>(d, palette.pairs, slots.pairs, slots, i, tile.quaternions[i]);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     if constexpr (method != Method::linear) {
-      Vec<D> sums[8], *const quaternion = isLone ? tile.quaternions[i] : sums;
+      Vec<D> sums[8], *const quaternion = isSummed ? tile.quaternions[i] : sums;
       Vec<D> more[12], *const rows = isLone ? tile.rows[i] : more;
       if constexpr (!isLone && needsCentersOfRotation(method))
-        sumCompany<12, false>(d, palette.rows, slots.joints, slots, first + i, rows);
-      if constexpr (!isLone) {
-        sumCompany<quaternionNumbers(method), false>(d, palette.pairs, slots.pairs, slots,
-                                                     first + i, quaternion);
+        sumCompany<12, false>(d, palette.rows, slots.joints, slots, i, rows);
+      if constexpr (!isSummed) {
+        sumCompany<quaternionNumbers(method), false>(d, palette.pairs, slots.pairs, slots, i,
+                                                     quaternion);
       }
-      turnUnit<method, scales, tangents, place, mesh>(d, by, quaternion, rows, first + i, own[i]);
+      turnUnit<method, scales, tangents, place, mesh>(d, by, quaternion, rows, i, own[i]);
     }
     if (!isLone && ahead.to != nullptr) fetchLines(d, ahead, i);
   }
@@ -268,8 +283,7 @@ DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t first, std::siz
     constexpr std::size_t stride = std::extent_v<decltype(tile.rows), 1>;
     moveAll(tile.rows[0], stride);
     normalizeAll(tile.rows[0], stride);
-    for (std::size_t i = 0; i < count; ++i)
-      mixUnit<tangents, mesh>(d, by, tile.rows[i], first + i, own[i]);
+    for (std::size_t i = 0; i < count; ++i) mixUnit<tangents, mesh>(d, by, tile.rows[i], i, own[i]);
   }
 }
 
@@ -280,18 +294,19 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
                                      const Direct<D>* direct, std::size_t vertex, Tile<D>& tile) {
   // Copies, which stores into the tile cannot change.
   const Palette palette = given.palette;
-  const Skinning by{palette, given.slots, given.from, given.normals};
+  Skinning by{palette, given.slots, given.from, given.normals};
   constexpr std::size_t step = isLone ? Tile<D>::mostLone : blockVertices;
   for (std::size_t first = 0; first < units; first += step) {
+    if (first != 0) by.advance<isLone, place>(d, step);
     const std::size_t count = isLone ? std::min(step, units - first) : step;
     Vec<D>(*const own)[slotCount] = tile.slots + (direct == nullptr ? first : 0);
-    if constexpr (isLone) blendLone<method, scales>(d, palette, by.slots, first, count, tile);
+    if constexpr (isLone) blendLone<method, scales>(d, palette, by.slots, count, tile);
     Ahead ahead{};
     if (!isLone && direct != nullptr) {
       const std::size_t slots = direct->records.all[0].slots;
       ahead = {direct->to[0], (vertex + first + blockVertices) * slots, slots > 6};
     }
-    skinSome<isLone, method, scales, tangents, place>(d, by, first, count, ahead, tile, own);
+    skinSome<isLone, method, scales, tangents, place>(d, by, count, ahead, tile, own);
     if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
     encodeUnits(d, direct->places, count, own);
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {

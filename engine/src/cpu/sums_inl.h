@@ -14,6 +14,12 @@ struct Slots {
   const std::uint16_t* pairs;
   const float* weights;
   std::uint32_t influences;
+
+  void advance(std::size_t vertices) {
+    joints += vertices * influences;
+    pairs += vertices * influences;
+    weights += vertices * influences;
+  }
 };
 
 // In the functions below, if entries are `relative`, those of other joints are differences to the
