@@ -228,8 +228,8 @@ HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& s
   blend(std::integral_constant<std::size_t, 0>());
 }
 
-/// Skins `count` units into slots, with what `blendLone` left in the tile, or sums for a company. In
-/// short loops, so that a processor begins a unit before the last one ends.
+/// Skins units into slots, with what `blendLone` left in the tile, or sums for a company. In short
+/// loops, so that a processor begins a unit before the last one ends.
 template <bool isLone, Method method, bool scales, bool tangents, From place, class D>
 DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t count, Ahead ahead, Tile<D>& tile,
                             Vec<D> (*own)[slotCount]) {

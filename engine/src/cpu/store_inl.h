@@ -6,6 +6,7 @@
 #include <cstring>
 #include <span>
 #include <type_traits>
+#include <utility>
 
 #include "cpu/dense_inl.h"
 #include "cpu/encode_inl.h"
@@ -281,23 +282,10 @@ template <class D>
 DERMIS_INLINE void storeBlock(D d, const Record& record, float* const* to, std::size_t offset,
                               const Vec<D>* slots) {
 #ifndef DERMIS_CPU_SMALL
-  static_assert(std::size(shapes) == 6);
-  switch (record.shape) {
-    case 0:
-      return storeShape<0>(d, to, offset, slots);
-    case 1:
-      return storeShape<1>(d, to, offset, slots);
-    case 2:
-      return storeShape<2>(d, to, offset, slots);
-    case 3:
-      return storeShape<3>(d, to, offset, slots);
-    case 4:
-      return storeShape<4>(d, to, offset, slots);
-    case 5:
-      return storeShape<5>(d, to, offset, slots);
-    default:
-      break;
-  }
+  const auto byShape = [&]<std::size_t... number>(std::index_sequence<number...>) HWY_ATTR {
+    return ((record.shape == number && (storeShape<number>(d, to, offset, slots), true)) || ...);
+  };
+  if (byShape(std::make_index_sequence<std::size(shapes)>())) return;
 #endif
   const auto* const numbers = reinterpret_cast<const float*>(slots);
   const std::size_t words = record.slots * blockVertices;
