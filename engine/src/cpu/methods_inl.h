@@ -259,8 +259,8 @@ DERMIS_INLINE void skinSome(D d, const Skinning& by, std::size_t count, Ahead ah
     moveAll(own[0], slotCount);
     normalizeAll(own[0], slotCount);
   }
-  // With four lanes, sums are a loop of their own, too: they load, what follows computes.
-  constexpr bool isSummed = isLone || (hn::MaxLanes(d) < 8 && !needsCentersOfRotation(method));
+  // Sums load, what follows computes: a loop of their own, where there is only one other.
+  constexpr bool isSummed = isLone || (!scales && !needsCentersOfRotation(method));
   if constexpr (!isLone && isSummed && method != Method::linear) {
     for (std::size_t i = 0; i < count; ++i)
       sumCompany<8, false>(d, palette.pairs, slots.pairs, slots, i, tile.quaternions[i]);
