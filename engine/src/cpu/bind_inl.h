@@ -172,44 +172,44 @@ inline HWY_ATTR void morphLone(D d, const MeshData& mesh, std::uint32_t number,
   }
 }
 
-/// Morphs a block of a company, with the weights of its members in the lanes.
+/// Morphs a block of a company, with the weights of its members in the lanes: each vertex stays in
+/// registers while all targets displace it.
 template <class D>
 inline HWY_ATTR void morphCompany(D d, const MeshData& mesh, std::uint32_t number,
                                   ActiveTargets& active, std::size_t unit, Tile<D>& tile) {
   const bool normals = !mesh.normals.empty(), tangents = !mesh.tangents.empty();
   const Source from = sourceOf(mesh, Method::dualQuaternion, number);
-  for (std::size_t vertex = 0; vertex < blockVertices; ++vertex) {
-    const auto load = [&](const float* values, std::size_t components, std::size_t first,
-                          std::size_t end, Vec<D>* to) HWY_ATTR {
-      for (std::size_t c = first; c < end; ++c)
-        to[c] = loadComponent<From::company>(d, values, components, c, vertex);
-    };
-    load(from.positions, 3, 0, 3, tile.positions[unit + vertex]);
-    if (normals) load(from.givenNormals, 3, 0, 3, tile.givenNormals[unit + vertex]);
-    if (!tangents) continue;
-    load(from.givenTangents, 4, 0, 3, tile.givenTangents[unit + vertex]);
-    load(from.tangents, 4, 3, 4, tile.tangents[unit + vertex]);
-  }
   active.find(mesh, number * blockVertices / abi::MORPH_BLOCK_VERTICES);
+  active.parts.clear();
   for (const BlockDisplacements& displacements : active.displacements) {
     const Displacements part = partOf(displacements, number);
-    const auto* word = reinterpret_cast<const float*>(part.words);
-    const Vec<D> w = hn::Load(d, displacements.target->weights);
-    const auto isActive = hn::Ne(w, hn::Zero(d));
-    for (std::uint32_t mask = part.mask; mask != 0; mask &= mask - 1) {
-      const std::size_t own = unit + static_cast<std::size_t>(std::countr_zero(mask));
-      const auto add = [&](std::uint32_t attribute, bool isWanted, Vec<D>* to) HWY_ATTR {
-        if ((displacements.attributes & attribute) == 0) return;
-        for (std::size_t k = 0; isWanted && k < 3; ++k) {
-          const Vec<D> sum = hn::Add(to[k], hn::Mul(w, hn::Set(d, word[k])));
-          to[k] = hn::IfThenElse(isActive, sum, to[k]);
-        }
-        word += 3;
+    if (part.mask != 0) active.parts.push_back(part);
+  }
+  for (std::size_t vertex = 0; vertex < blockVertices; ++vertex, ++unit) {
+    Vec3<D> position = loadThree<From::company>(d, from.positions, 3, vertex);
+    Vec3<D> normal = position, tangent = position;
+    if (normals) normal = loadThree<From::company>(d, from.givenNormals, 3, vertex);
+    if (tangents) tangent = loadThree<From::company>(d, from.givenTangents, 4, vertex);
+    for (Displacements& part : active.parts) {
+      if ((part.mask >> vertex & 1) == 0) continue;
+      const Vec<D> w = hn::Load(d, part.of->target->weights);
+      const auto isActive = hn::Ne(w, hn::Zero(d));
+      const auto add = [&](std::uint32_t attribute, Vec3<D>& to) HWY_ATTR {
+        if ((part.of->attributes & attribute) == 0) return;
+        const auto* const by = reinterpret_cast<const float*>(part.words);
+        const Vec3<D> displacement{hn::Set(d, by[0]), hn::Set(d, by[1]), hn::Set(d, by[2])};
+        to = choose3(isActive, add3(to, scale3(displacement, w)), to);
+        part.words += 3;
       };
-      add(abi::MORPH_HAS_POSITIONS, true, tile.positions[own]);
-      add(abi::MORPH_HAS_NORMALS, normals, tile.givenNormals[own]);
-      add(abi::MORPH_HAS_TANGENTS, tangents, tile.givenTangents[own]);
+      add(abi::MORPH_HAS_POSITIONS, position);
+      add(abi::MORPH_HAS_NORMALS, normal);
+      add(abi::MORPH_HAS_TANGENTS, tangent);
     }
+    setThree(tile.positions[unit], position);
+    if (normals) setThree(tile.givenNormals[unit], normal);
+    if (!tangents) continue;
+    setThree(tile.givenTangents[unit], tangent);
+    tile.tangents[unit][3] = loadComponent<From::company>(d, from.tangents, 4, 3, vertex);
   }
 }
 

@@ -73,9 +73,8 @@ inline HWY_ATTR void skinTogether(D d, const SectionTask& part, const Common& co
   Findings<D> findings(d);
   // Not on the stack: an engine's fibers may have little of it.
   auto& tile = *new (floatsOf(part.scratch[0].tile, sizeof(Tile<D>) / sizeof(float))) Tile<D>;
-  constexpr std::size_t most = (isLone ? Tile<D>::mostLone : Tile<D>::most) / unitsOf<isLone, D>;
   const Direct<D> direct = directOf<isLone>(d, together);
-  forTiles(part, common.isDirect ? mostBlocks : most,
+  forTiles(part, common.isDirect ? mostBlocks : tileBlocks<isLone, D>,
            [&](const Blocks& blocks, const VertexRange& range) HWY_ATTR {
              common.isDirect
                  ? skinDirectly<isLone>(d, together, direct, blocks, range, tile, findings)

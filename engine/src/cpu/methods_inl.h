@@ -307,7 +307,7 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
       ahead = {direct->to[0], (vertex + first + blockVertices) * slots, slots > 6};
     }
     skinSome<isLone, method, scales, tangents, place>(d, by, count, ahead, tile, own);
-    if (direct == nullptr || (place == From::tile && !isLone)) continue;  // or morphed
+    if (direct == nullptr) continue;
     encodeUnits(d, direct->places, count, own);
     for (std::size_t i = 0; direct->records.keepsPositions && i < count; ++i) {
       const std::size_t number = vertex + (first + i) * unitVertices<isLone, D>;

@@ -51,11 +51,19 @@ inline std::optional<BlockDisplacements> displacementsOf(const MeshData& mesh,
                             target.attributes, &active};
 }
 
+/// The part of it that displaces eight vertices.
+struct Displacements {
+  std::uint32_t mask;  ///< one bit for each vertex
+  const std::uint32_t* words;
+  const BlockDisplacements* of;
+};
+
 /// What active targets displace of the vertices that were asked for last.
 struct ActiveTargets {
   std::vector<ActiveTarget> all;  ///< in ascending order
   std::uint32_t number = 0;       ///< of the block
   std::vector<BlockDisplacements> displacements;
+  std::vector<Displacements> parts;  ///< of eight of them
 
   /// `morphs`: those of each instance that are not in `all` yet, in ascending order of targets.
   void begin(const MeshData& mesh, std::span<std::span<const MorphWeight>> morphs);
@@ -69,19 +77,14 @@ struct ActiveTargets {
   }
 };
 
-/// The part of it that displaces eight vertices.
-struct Displacements {
-  std::uint32_t mask;  ///< one bit for each vertex
-  const std::uint32_t* words;
-};
-
 /// Those of a block of the CPU path's mesh.
 inline Displacements partOf(const BlockDisplacements& displacements, std::uint32_t block) {
   const std::uint32_t shift = block * blockVertices % abi::MORPH_BLOCK_VERTICES;
   const std::uint64_t before = displacements.mask & ((std::uint64_t{1} << shift) - 1);
   return {
       static_cast<std::uint32_t>(displacements.mask >> shift & 0xff),
-      displacements.words + static_cast<std::size_t>(std::popcount(before)) * displacements.size};
+      displacements.words + static_cast<std::size_t>(std::popcount(before)) * displacements.size,
+      &displacements};
 }
 
 /// Adds them to a block of the first instance. `positions`, `normals` and `tangents` have three

@@ -38,7 +38,7 @@ struct Common {
         hasResults(
             std::any_of(instances, instances + count,
                         [](const TaskInstance* instance) { return instance->result != nullptr; })),
-        isDirect(!isMorphed && !hasResults && task.places.hasMotion() == records.keepsPositions &&
+        isDirect(!hasResults && task.places.hasMotion() == records.keepsPositions &&
                  !isSnormPosition(task.places[Stream::positions].format)) {
     for (const Record& record : std::span(records.all).first(records.count)) {
       isDirect = isDirect && record.isDense && (lanes > 1 || byDenseSize(record, [](auto) {}));
@@ -192,6 +192,25 @@ inline HWY_ATTR void storeTile(D d, const Together& together, std::size_t vertex
   copyPositions(true);
 }
 
+/// Skins blocks of a run into the tile, or stores them directly.
+template <bool isLone, class D>
+inline HWY_ATTR void skinBlocks(D d, const Together& together, const Blocks& blocks,
+                                const Direct<D>* direct, Tile<D>& tile) {
+  Skinning by = skinningOf(together, blocks.run, blocks.first);
+  if (together.common.isMorphed) {
+    morphTile<isLone>(d, *together.task.mesh, blocks.first, blocks.end, together.morphs, tile,
+                      by.from);
+  }
+  const std::size_t units = (blocks.end - blocks.first) * unitsOf<isLone, D>;
+  const std::size_t vertex = std::size_t{blocks.first} * blockVertices;
+  byMethod(together.task, by.palette.scales, [&](auto method, auto scales, auto tangents) HWY_ATTR {
+    by.from.isTile ? skinUnits<isLone, method(), scales(), tangents(), From::tile>(
+                         d, by, units, direct, vertex, tile)
+                   : skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(
+                         d, by, units, direct, vertex, tile);
+  });
+}
+
 /// Skins a tile. Only vertices in the range are stored and count for results.
 template <bool isLone, class D>
 inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& blocks,
@@ -200,17 +219,7 @@ inline HWY_ATTR void skinTile(D d, const Together& together, const Blocks& block
   const std::size_t units = (blocks.end - blocks.first) * unitsOf<isLone, D>;
   const std::size_t vertex = std::size_t{blocks.first} * blockVertices;
   fetchOutput(together, vertex, range);
-  Skinning by = skinningOf(together, blocks.run, blocks.first);
-  if (together.common.isMorphed) {
-    morphTile<isLone>(d, *task.mesh, blocks.first, blocks.end, together.morphs, tile, by.from);
-  }
-  const Direct<D>* const none = nullptr;
-  byMethod(task, by.palette.scales, [&](auto method, auto scales, auto tangents) HWY_ATTR {
-    by.from.isTile
-        ? skinUnits<isLone, method(), scales(), tangents(), From::tile>(d, by, units, none, 0, tile)
-        : skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(d, by, units, none,
-                                                                                 0, tile);
-  });
+  skinBlocks<isLone, D>(d, together, blocks, nullptr, tile);
   if (together.common.hasResults) findBounds<isLone>(d, tile, units, range, findings);
   if (isSnormPosition(task.places[Stream::positions].format))
     relateToBoxes<isLone>(d, together.instances, units, range, tile, findings);
@@ -230,15 +239,12 @@ inline HWY_ATTR void skinDirectly(D d, const Together& together, const Direct<D>
   };
   if (range.first != std::size_t{whole} * blockVertices)
     skinPart(0, range.first, std::min<std::size_t>(range.end, blockVertices));
-  if (whole < end) {
-    const std::uint32_t block = blocks.first + whole;
-    const Skinning by = skinningOf(together, blocks.run, block);
-    byMethod(together.task, by.palette.scales,
-             [&](auto method, auto scales, auto tangents) HWY_ATTR {
-               skinUnits<isLone, method(), scales(), tangents(), fromMesh<isLone, D>>(
-                   d, by, (end - whole) * unitsOf<isLone, D>, &direct,
-                   std::size_t{block} * blockVertices, tile);
-             });
+  // Morphed vertices pass through the tile.
+  const std::uint32_t most = together.common.isMorphed ? tileBlocks<isLone, D> : end;
+  for (std::uint32_t block = whole; block < end; block += most) {
+    skinBlocks<isLone>(
+        d, together, {blocks.run, blocks.first + block, blocks.first + std::min(block + most, end)},
+        &direct, tile);
   }
   if (end >= whole && range.end != std::size_t{end} * blockVertices)
     skinPart(end, 0, range.end - std::size_t{end} * blockVertices);

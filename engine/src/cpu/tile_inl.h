@@ -46,6 +46,11 @@ inline constexpr std::size_t unitVertices = isLone ? hn::MaxLanes(D()) : 1;
 template <bool isLone, class D>
 inline constexpr std::size_t unitsOf = blockVertices / unitVertices<isLone, D>;
 
+/// How many blocks fit into a tile.
+template <bool isLone, class D>
+inline constexpr std::uint32_t tileBlocks =
+    (isLone ? Tile<D>::mostLone : Tile<D>::most) / unitsOf<isLone, D>;
+
 /// Whether all vertices of a unit belong to the job.
 template <bool isLone, class D>
 DERMIS_INLINE bool isWhole(const VertexRange& range, std::size_t unit) {
