@@ -834,31 +834,41 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   EXPECT_TRUE(cpu::skin(good).ok());
 }
 
-TEST_F(CpuSkinTest, VerticesOfAThousandInfluencesAndNoMore) {
-  const std::uint32_t joints = 1200;
-  for (const std::uint32_t influences : {1000u, 1001u}) {
-    std::vector<std::uint32_t> numbers(influences);
-    std::vector<float> weights(influences, 1);
-    for (std::uint32_t i = 0; i < influences; ++i) numbers[i] = i;
-    const float position[3] = {1, 2, 3};
+// Eight vertices, each with a pivot of its own, have as many pairs as numbers of sixteen bits can
+// say.
+TEST_F(CpuSkinTest, VerticesOf512InfluencesAndNoMore) {
+  const std::uint32_t joints = 600, vertices = 8;
+  for (const std::uint32_t influences : {512u, 513u}) {
+    const std::size_t all = std::size_t{vertices} * influences;
+    std::vector<std::uint32_t> numbers(all);
+    std::vector<float> weights(all, 1), positions(vertices * 3, 3);
+    for (std::size_t i = 0; i < all; ++i) numbers[i] = static_cast<std::uint32_t>(i % influences);
+    for (std::uint32_t vertex = 0; vertex < vertices; ++vertex)
+      weights[std::size_t{vertex} * influences + vertex] = 2;
     InfluenceSet set;
-    set.joints = {numbers.data(), 1, influences * 4, ComponentType::uint32, influences};
-    set.weights = attributeView(weights.data(), 1, influences);
+    set.joints = {numbers.data(), vertices, influences * 4, ComponentType::uint32, influences};
+    set.weights = attributeView(weights.data(), vertices, influences);
     MeshView view;
-    view.vertexCount = 1;
-    view.positions = attributeView(position, 1, 3);
+    view.vertexCount = vertices;
+    view.positions = attributeView(positions.data(), vertices, 3);
     view.influenceSets = {&set, 1};
     const Result<cpu::Mesh> mesh = cpu::Mesh::create(pack(view, joints).value());
-    EXPECT_EQ(mesh.ok(), influences == 1000);
+    EXPECT_EQ(mesh.ok(), influences == 512);
     if (!mesh) continue;
-    const std::vector<JointMatrix> pose(joints);
-    float skinned[3] = {};
+    std::vector<JointMatrix> pose(joints);
+    for (std::uint32_t joint = 0; joint < joints; ++joint)
+      pose[joint].m[0][3] = static_cast<float>(joint);
+    std::vector<float> skinned(positions.size());
     cpu::Instance instance;
     instance.pose = pose;
-    instance.output.fill(skinned);
-    const VertexPlaces places = placeVertices({}, 1).value();
+    instance.output.fill(skinned.data());
+    const VertexPlaces places = placeVertices({}, vertices).value();
     ASSERT_TRUE(cpu::skin(jobOf(*mesh, cpu::Job{}.method, places, {&instance, 1})).ok());
-    EXPECT_NEAR(skinned[2], 3, 1e-5);
+    const float sum = 512 * 511 / 2;
+    for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+      EXPECT_NEAR(skinned[vertex * 3], 3 + (sum + static_cast<float>(vertex)) / 513, 1e-3);
+      EXPECT_NEAR(skinned[vertex * 3 + 2], 3, 1e-5);
+    }
   }
 }
 

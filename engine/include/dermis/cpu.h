@@ -30,7 +30,7 @@ struct MeshData;
 class DERMIS_CPU_API Mesh {
  public:
   /// Converts a packed mesh, which may be released afterwards. O(vertices × influences). Fails with
-  /// `limitExceeded` if a vertex has more than 1,000 influences.
+  /// `limitExceeded` if a vertex has more than 512 influences.
   static Result<Mesh> create(const PackedMesh& packed);
   ~Mesh();
   Mesh(Mesh&&) noexcept;

@@ -15,10 +15,10 @@
 namespace dermis::cpu {
 namespace {
 
-constexpr std::uint32_t mostInfluences = 1000;
+constexpr std::uint32_t mostInfluences = 512;
 /// Limits a section so that its dual quaternions stay in the cache for four instances at a time.
 constexpr std::size_t sectionPairs = 1024;
-static_assert(blockVertices * mostInfluences < 65536 / indexScale);
+static_assert(blockVertices * mostInfluences <= 65536 / indexScale);
 
 /// Reads a packed mesh. Its contents were checked when it was made.
 class Reader {

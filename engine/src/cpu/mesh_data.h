@@ -32,9 +32,10 @@ const float* numbersOf(const Line* lines) {
 /// Denotes an identity joint, the only joint of vertices without influences.
 inline constexpr std::uint32_t stillJoint = 0xffffffff;
 
-/// Influences store indices into the lists of a section, multiplied by this: for entries of eight
-/// floats, the offset of the entry in floats.
-inline constexpr std::uint32_t indexScale = 8;
+/// Influences store indices into the lists of a section, multiplied by this. An entry of eight
+/// numbers for each of four lanes is then eight times as many bytes from the first, which an
+/// address can say.
+inline constexpr std::uint32_t indexScale = 16;
 
 /// A pivot and a joint that influences vertices of that pivot, as indices into `Section`'s joints.
 /// Each pose gives a dual quaternion for each pair, in the pivot's hemisphere, so that vertices add

@@ -22,6 +22,14 @@ struct Slots {
   }
 };
 
+/// An entry of `floats` numbers of a table, by a number of a slot.
+template <std::size_t floats>
+DERMIS_INLINE const float* entryOf(const float* entries, std::uint16_t number) {
+  constexpr std::size_t scale = floats * sizeof(float) / indexScale;
+  return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(entries) +
+                                        number * scale);
+}
+
 // In the functions below, if entries are `relative`, those of other joints are differences to the
 // pivot's, the first influence, which is added with weight 1. Two by two, so that fewer additions
 // wait for each other: (e₀ + w₁ e₁) + (w₂ e₂ + w₃ e₃) + …. Four influences, the usual number, take
@@ -48,22 +56,22 @@ DERMIS_INLINE void addTwo(D d, const float* entry, Vec<D> w, const float* other,
 template <std::size_t N, bool relative, class D>
 DERMIS_INLINE void sumCompany(D d, const float* entries, const std::uint16_t* HWY_RESTRICT numbers,
                               const Slots& slots, std::size_t unit, Vec<D>* sums) {
-  constexpr std::size_t lanes = hn::MaxLanes(d), stride = (N > 8 ? 2 : 1) * lanes;
+  constexpr std::size_t lanes = hn::MaxLanes(d);
   const std::size_t count = slots.influences;
   const float* const HWY_RESTRICT weights = slots.weights + unit * count;
   const std::uint16_t* const HWY_RESTRICT own = numbers + unit * count;
-  const float* const first = entries + own[0] * stride;
+  const auto entry = [&](std::size_t i)
+                         HWY_ATTR { return entryOf<(N > 8 ? 16 : 8) * lanes>(entries, own[i]); };
+  const float* const first = entry(0);
   Vec<D> sum[N];
   for (std::size_t k = 0; k < N; ++k) {
     sum[k] = hn::Load(d, first + k * lanes);
     if (!relative) sum[k] = hn::Mul(hn::Set(d, weights[0]), sum[k]);
   }
-  const auto one = [&](std::size_t i) HWY_ATTR {
-    addOne<N>(d, entries + own[i] * stride, hn::Set(d, weights[i]), sum);
-  };
+  const auto one = [&](std::size_t i)
+                       HWY_ATTR { addOne<N>(d, entry(i), hn::Set(d, weights[i]), sum); };
   const auto two = [&](std::size_t i) HWY_ATTR {
-    addTwo<N>(d, entries + own[i] * stride, hn::Set(d, weights[i]), entries + own[i + 1] * stride,
-              hn::Set(d, weights[i + 1]), sum);
+    addTwo<N>(d, entry(i), hn::Set(d, weights[i]), entry(i + 1), hn::Set(d, weights[i + 1]), sum);
   };
 #ifndef DERMIS_CPU_SMALL
   if (count == 4) {
@@ -100,9 +108,9 @@ DERMIS_INLINE Vec<D> sumVertex(D d, const float* entries, const std::uint16_t* n
   const std::size_t first = vertex * count;
   const auto term = [&](std::size_t i) HWY_ATTR {
     return hn::Mul(hn::Set(d, slots.weights[first + i]),
-                   hn::Load(d, entries + numbers[first + i] * units));
+                   hn::Load(d, entryOf<8 * units>(entries, numbers[first + i])));
   };
-  Vec<D> sum = relative ? hn::Load(d, entries + numbers[first] * units) : term(0);
+  Vec<D> sum = relative ? hn::Load(d, entryOf<8 * units>(entries, numbers[first])) : term(0);
   if (count > 1) sum = hn::Add(sum, term(1));
   std::size_t i = 2;
   for (; i + 1 < count; i += 2) sum = hn::Add(sum, hn::Add(term(i), term(i + 1)));
