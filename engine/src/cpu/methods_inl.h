@@ -1,5 +1,5 @@
-// The first stage: blends what a method needs, and skins the vertices of a tile by it. Blocks of a
-// company that no other stage changes are stored here, too.
+// The first stage: blends what a method needs, and skins the vertices of a tile by it. Blocks that
+// are stored directly are encoded and stored here, too.
 #pragma once
 
 #include <algorithm>
@@ -206,8 +206,8 @@ HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
   }
 }
 
-/// Blends what `count` units of a lone instance from `first` on need, into the tile. A loop of its
-/// own: one for all would be too long for a processor to begin a unit before the last one ends.
+/// Blends what units of a lone instance need, into the tile. A loop of its own: one for all would be
+/// too long for a processor to begin a unit before the last one ends.
 template <Method method, bool scales, class D>
 HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
                                      std::size_t count, Tile<D>& tile) {
@@ -304,7 +304,8 @@ HWY_NOINLINE HWY_ATTR void skinUnits(D d, const Skinning& given, std::size_t uni
     Ahead ahead{};
     if (!isLone && direct != nullptr) {
       const std::size_t slots = direct->records.all[0].slots;
-      ahead = {direct->to[0], (vertex + first + blockVertices) * slots, slots > 6};
+      ahead = {direct->to[0], (vertex + first + blockVertices) * slots,
+               slots * blockVertices * sizeof(float) > std::size_t{3} * 64};
     }
     skinSome<isLone, method, scales, tangents, place>(d, by, count, ahead, tile, own);
     if (direct == nullptr) continue;

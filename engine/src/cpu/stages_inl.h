@@ -239,7 +239,7 @@ inline HWY_ATTR void skinDirectly(D d, const Together& together, const Direct<D>
   };
   if (range.first != std::size_t{whole} * blockVertices)
     skinPart(0, range.first, std::min<std::size_t>(range.end, blockVertices));
-  // Morphed vertices pass through the tile.
+  // Morphed vertices come from the tile.
   const std::uint32_t most = together.common.isMorphed ? tileBlocks<isLone, D> : end;
   for (std::uint32_t block = whole; block < end; block += most) {
     skinBlocks<isLone>(
