@@ -197,7 +197,7 @@ struct Posed {
   /// Vertices of which this joint is the pivot may have influences in opposite hemispheres.
   bool split = false;
 };
-static_assert(sizeof(Posed) == 256, "`skinnedBounds` needs 32 KiB of stack");
+static_assert(sizeof(Posed) <= 256, "`skinnedBounds` needs 32 KiB of stack");
 
 /// How far v may be from map p, for the points of an extent.
 double errorOf(const Posed& joint, const Extent& extent) {
