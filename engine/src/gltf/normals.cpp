@@ -70,7 +70,7 @@ class Unwelder {
     for (const auto& [vertex, element] : displaced) {
       vertices.push_back(vertex);
       if (target.positions.empty()) continue;
-      const auto from = target.positions.begin() + std::ptrdiff_t{3} * element;
+      const auto from = target.positions.begin() + static_cast<std::ptrdiff_t>(element) * 3;
       positions.insert(positions.end(), from, from + 3);
     }
     target.vertices = std::move(vertices);

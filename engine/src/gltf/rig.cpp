@@ -403,7 +403,7 @@ class RigReader {
       if (parent != noIndex)
         above[node] = jointOfNode[parent] != noIndex ? jointOfNode[parent] : above[parent];
     }
-    rig_.joints.resize(count + ofChains_);
+    rig_.joints.resize(static_cast<std::size_t>(count + ofChains_));
     for (std::uint32_t joint = 0; joint < count; ++joint)
       rig_.joints[rig_.places[joint]] = {above[skin_.joints[joint]],
                                          inverseOrZero(skin_.inverseBindMatrices[joint])};

@@ -194,7 +194,8 @@ class Recorder {
 
   void operator()(const UploadCommand& upload) {
     const BufferRange& to = buffers_[upload.to.buffer].range;
-    const std::span<std::byte> staged = staging_->bytes.subspan(staging_->used);
+    const std::span<std::byte> staged =
+        staging_->bytes.subspan(static_cast<std::size_t>(staging_->used));
     if (upload.bytes.data() != staged.data()) std::ranges::copy(upload.bytes, staged.begin());
     addCopy(staging_->buffer, to.buffer,
             {staging_->used, to.offset + upload.to.offset, upload.to.size});

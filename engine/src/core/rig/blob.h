@@ -129,9 +129,9 @@ struct RigBlob {
     std::memcpy(&record, &words[offset], sizeof(Record));
   }
   template <typename Record>
-  Record at(std::size_t offset) const {
+  Record at(std::uint64_t offset) const {
     Record record;
-    read(record, offset);
+    read(record, static_cast<std::size_t>(offset));
     return record;
   }
   RigDriver driver(std::size_t number) const {

@@ -70,11 +70,10 @@ class RigCheck {
   static bool areFinite(const float (&matrix)[rows][4]) {
     return std::ranges::all_of(matrix, [](const auto& row) { return areFinite(row); });
   }
-  bool areFinite(std::size_t offset, std::size_t count) const {
-    for (std::size_t i = offset; i < offset + count; ++i) {
-      if (!std::isfinite(std::bit_cast<float>(rig_.words[i]))) return false;
-    }
-    return true;
+  bool areFinite(std::uint64_t offset, std::uint64_t count) const {
+    return std::ranges::all_of(
+        rig_.words.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(count)),
+        [](std::uint32_t word) { return std::isfinite(std::bit_cast<float>(word)); });
   }
   bool isKnown(std::uint32_t joint) const {
     const std::uint32_t written = rig_.header.writtenJoints;

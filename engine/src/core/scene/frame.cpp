@@ -647,7 +647,8 @@ Result<void> SceneBooks::readBack(std::uint64_t frame, std::span<const std::byte
     std::fill_n(resultFrames_.begin() + static_cast<std::ptrdiff_t>(first), count, frame);
   }
   readEarlierBoxes(found->boxes);
-  readHistory(bytes.subspan(history.toOffset, history.size));
+  readHistory(bytes.subspan(static_cast<std::size_t>(history.toOffset),
+                            static_cast<std::size_t>(history.size)));
   return {};
 }
 
