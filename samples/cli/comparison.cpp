@@ -235,7 +235,7 @@ class MethodComparer {
     if (!mesh) return mesh.error();
     const Result<VertexPlaces> places = placeVertices(VertexLayout{}, packed.vertexCount());
     if (!places) return places.error();
-    std::vector<std::byte> output(places->size * copies);
+    std::vector<std::byte> output(static_cast<std::size_t>(places->size) * copies);
     std::vector<cpu::Instance> instances(copies);
     for (std::size_t i = 0; i < copies; ++i) {
       instances[i].pose = pose;

@@ -353,7 +353,8 @@ DrivenPose drive(const PackedRig& rig, const samples::RigInput& input) {
   std::vector<float> weights(input.givenWeights.size() + rig.drivenWeights());
   samples::must(evaluateRig(rig, input.written, input.givenWeights,
                             std::span(pose.palette).subspan(input.written.size()), weights));
-  pose.weights.assign(weights.end() - rig.drivenWeights(), weights.end());
+  pose.weights.assign(weights.end() - static_cast<std::ptrdiff_t>(rig.drivenWeights()),
+                      weights.end());
   return pose;
 }
 
