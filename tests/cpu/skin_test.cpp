@@ -834,8 +834,8 @@ TEST_F(CpuSkinTest, JobsThatMakeNoSenseAreRefusedAndNothingIsWritten) {
   EXPECT_TRUE(cpu::skin(good).ok());
 }
 
-// Eight vertices, each with a pivot of its own, have as many pairs as numbers of sixteen bits can
-// say.
+// Every vertex of a block has another pivot, so the block has 4,096 pairs: the most that 16-bit
+// numbers allow.
 TEST_F(CpuSkinTest, VerticesOf512InfluencesAndNoMore) {
   const std::uint32_t joints = 600, vertices = 8;
   for (const std::uint32_t influences : {512u, 513u}) {

@@ -206,8 +206,8 @@ HWY_INLINE void fetchLines(D d, const Ahead& ahead, std::size_t first) {
   }
 }
 
-/// Blends what units of a lone instance need, into the tile. A loop of its own: one for all would
-/// be too long for a processor to begin a unit before the last one ends.
+/// Blends the joints of some units of a lone instance into the tile. This loop is separate so that
+/// a processor can begin the next unit before the last one ends.
 template <Method method, bool scales, class D>
 HWY_NOINLINE HWY_ATTR void blendLone(D d, const Palette& palette, const Slots& slots,
                                      std::size_t count, Tile<D>& tile) {
